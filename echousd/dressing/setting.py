@@ -206,8 +206,7 @@ def standing(
 def rectangle(centre: np.ndarray, size: np.ndarray, yaw: float) -> shapely.Polygon:
     """A rectangle in plan (x, z), `size` along its own x and z, turned by `yaw` about +Y."""
     (wide, deep), (x, z) = size, centre
-    plan = footprints(np.array([[wide, 0.0, deep]]), np.array([[x, 0.0, z]]), np.array([yaw]))
-    return shapely.Polygon(plan[0])
+    return shapely.Polygon(footprints(np.array([[wide, 0.0, deep]]), np.array([[x, 0.0, z]]), np.array([yaw]))[0])
 
 
 def meets(thing: Standing, low: float, high: float, plan: shapely.Geometry) -> bool:

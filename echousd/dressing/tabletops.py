@@ -128,8 +128,7 @@ def _between(corners: np.ndarray, low: float, high: float) -> np.ndarray:
     first, second = plan[:, 1] - plan[:, 0], plan[:, 2] - plan[:, 0]
     flat = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) < 1e-7
     lines = shapely.linestrings(plan[flat]) if flat.any() else []
-    areas = shapely.polygons(plan[~flat]) if (~flat).any() else []
-    return np.array([*lines, *areas], object)
+    return np.array([*lines, *(shapely.polygons(plan[~flat]) if (~flat).any() else [])], object)
 
 
 LAID = 0.6  # share of rooms whose dining table is set

@@ -41,8 +41,7 @@ def thumbnail(mesh: trimesh.Trimesh, pixels: int, colours: np.ndarray = PLAIN) -
     picture = np.full((side, side, 3), 250.0)
     order = np.argsort(seen[:, 2])[:, None]  # what is nearer is drawn later, each point two pixels wide
     picture[y[order] + [0, 1, 0, 1], x[order] + [0, 0, 1, 1]] = shaded[face[order]]
-    image = Image.fromarray(picture.clip(0, 255).astype(np.uint8))
-    return image.resize((pixels, pixels), Image.Resampling.BOX)
+    return Image.fromarray(picture.clip(0, 255).astype(np.uint8)).resize((pixels, pixels), Image.Resampling.BOX)
 
 
 CELL = 2.8  # inches

@@ -98,5 +98,4 @@ class Blade(Solid):
         points, normal, half = self._spine((3, 4, 5, 7)[detail])
         reach = np.maximum(half, 0.06 * self.width)[:, None]
         out, fold, thick = reach * [1.0, 0.0, 0.0], 0.25 * reach * normal, self.thick / 2 * normal
-        rings = np.stack([points + out + fold, points + thick, points - out + fold, points - thick], 1)
-        return loft(rings)
+        return loft(np.stack([points + out + fold, points + thick, points - out + fold, points - thick], 1))

@@ -2,20 +2,26 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from echomodel.furniture.solids import Block, Solid, Turned, ball, rotation, tube, turned, upright
+from echomodel.furniture.solids import Block, Solid, Turned, Vector, ball, rotation, tube, turned, upright
 from echomodel.furniture.style import Style
 
 Size = np.ndarray  # (3,) width x, height y, depth z, metres
+Kind = TypeVar("Kind", bound=Block)
 
 
-def box(low: tuple, high: tuple, material: str = "wood", radius: float = 0.0, role: str = "board") -> Block:
-    """The block between two corners (3,)."""
+def between(kind: type[Kind], low: Vector, high: Vector, **form: Any) -> Kind:
+    """The block of a kind between two corners (3,)."""
     a, b = np.asarray(low, float), np.asarray(high, float)
-    return Block(centre=(a + b) / 2, half=np.maximum((b - a) / 2, 1e-4), radius=radius, material=material, role=role)
+    return kind(centre=(a + b) / 2, half=np.maximum((b - a) / 2, 1e-4), **form)
+
+
+def box(low: Vector, high: Vector, material: str = "wood", radius: float = 0.0, role: str = "board") -> Block:
+    """The block between two corners (3,)."""
+    return between(Block, low, high, material=material, radius=radius, role=role)
 
 
 def post(

@@ -69,7 +69,7 @@ def ottoman(size: Size, style: Style, choices: Choices) -> list[Solid]:
     split = foot + (h - foot) * 0.5
     return [
         *parts,
-        box((-w / 2 * 0.97, foot, -d / 2 * 0.97), (w / 2 * 0.97, split + 0.02, d / 2 * 0.97), "fabric", 0.012, "base"),
+        box((-w / 2 * 0.91, foot, -d / 2 * 0.91), (w / 2 * 0.91, split + 0.02, d / 2 * 0.91), "fabric", 0.012, "base"),
         cushion((-w / 2, split, -d / 2), (w / 2, h, d / 2), style),
     ]
 

@@ -1,9 +1,11 @@
 """What hangs in folds or gives way as a whole: pillows, covers of beds, sheets."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from echomodel.furniture.carpentry import between
 from echomodel.furniture.solids import FINEST, IDENTITY, Array, Ball, Block, Solid, Vector, loft
 
 # Of half a pillow's side that its middle stands back behind the corners, and the share of that below, where it lies.
@@ -41,7 +43,7 @@ class Pillow(Ball):
         side = np.concatenate([full + SEAM, -full[:, -2:0:-1] - SEAM], 1) - DROOP * (u * flat) ** 2
         side = side / max(1, np.abs(side).max())
         vertices, faces = loft(np.roll(np.stack([side, *outline(u, flat)], -1), thin, -1) * self.half)
-        return vertices, _outward(vertices, faces)
+        return vertices, outward(vertices, faces)
 
 
 def outline(u: Array, v: Array) -> tuple[Array, Array]:
@@ -98,10 +100,6 @@ class Cover(Block):
     phase: Vector = (0.0, 0.0, 0.0)
     falls: bool = False
 
-    @property
-    def gives(self) -> tuple[float, float]:
-        return min(0.25 * self.depth, SUNK), 1.0
-
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         w, h, d = self.half
         r, steps, (one, two, three) = min(self.radius, h, w / 2, d / 2), (5, 9, 18, 27)[detail], self.phase
@@ -147,7 +145,7 @@ class Sheet(Solid):
         far, after = self.front.size // 3, np.roll(border, -1)
         strip = np.stack([after, border, border + far, after, border + far, after + far], 1).reshape(-1, 3)
         vertices = np.concatenate([self.front.reshape(-1, 3), self.back.reshape(-1, 3)])
-        return vertices, _outward(vertices, np.concatenate([faces, faces[:, ::-1] + far, strip]))
+        return vertices, outward(vertices, np.concatenate([faces, faces[:, ::-1] + far, strip]))
 
 
 def grid(n: int, m: int) -> tuple[Array, Array]:
@@ -163,19 +161,19 @@ def cover(
     falls: bool = False,
 ) -> Solid:  # fmt: skip
     """The cover between two corners (3,), its edges rounded by `radius`, its folds `depth` deep, metres."""
-    a, b = np.asarray(low, float), np.asarray(high, float)
-    form = {"half": (b - a) / 2, "radius": radius, "depth": depth, "phase": rng.uniform(0, 2 * np.pi, 3)}
-    return Cover((a + b) / 2, IDENTITY, material, "cover", falls=falls, **form)
+    form: dict[str, Any] = {"radius": radius, "depth": depth, "phase": rng.uniform(0, 2 * np.pi, 3), "falls": falls}
+    form |= {"gives": (min(0.25 * depth, SUNK), 1.0), "material": material, "role": "cover"}
+    return between(Cover, low, high, **form)
 
 
 def closed(points: Array, faces: Array, border: Array, end: Vector) -> tuple[Array, Array]:
     """The closed surface of a `grid` of points (n, m, 3) whose border is joined to a point."""
     vertices = np.concatenate([points.reshape(-1, 3), [end]])
     fan = np.stack([np.roll(border, -1), border, np.full(len(border), len(vertices) - 1)], 1)
-    return vertices, _outward(vertices, np.concatenate([faces, fan]))
+    return vertices, outward(vertices, np.concatenate([faces, fan]))
 
 
-def _outward(vertices: Array, faces: Array) -> Array:
+def outward(vertices: Array, faces: Array) -> Array:
     """The faces of a closed surface, turned where its volume is negative."""
     a, b, c = vertices[faces].transpose(1, 0, 2)
     return faces if np.einsum("nx,nx->", a, np.cross(b, c)) > 0 else np.ascontiguousarray(faces[:, ::-1])

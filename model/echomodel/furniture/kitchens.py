@@ -155,8 +155,7 @@ def kitchen_island(size: Size, style: Style, choices: Choices) -> list[Solid]:
 
 def _units(w: float) -> list[tuple[float, float]]:
     """The left and right ends of equal units, about 0.6 m wide, that fill a width."""
-    edges = np.linspace(-w / 2, w / 2, max(1, round(w / UNIT)) + 1).tolist()
-    return list(pairwise(edges))
+    return list(pairwise(np.linspace(-w / 2, w / 2, max(1, round(w / UNIT)) + 1).tolist()))
 
 
 def _plinth(size: Size) -> list[Solid]:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from echomodel.furniture.bent import Bow
-from echomodel.furniture.carpentry import base, both, box, leg, of_role, top
+from echomodel.furniture.carpentry import Kind, base, both, box, leg, of_role, top
 from echomodel.furniture.pads import cushion
 from echomodel.furniture.solids import IDENTITY, Block, Solid, ball, rotation
 from echomodel.furniture.style import Style
@@ -22,17 +22,19 @@ def seat_of(style: Style, w: float, d: float, y: float, thick: float, z: float =
 
 
 def leaning(
-    low: tuple, high: tuple, rake: float, pivot_y: float, pivot_z: float, *, bow: float = 0.0,
-    padded: Style | None = None, **look: Any,
-) -> Block:  # fmt: skip
-    """A block that leans back by `rake` about the horizontal line through (pivot_y, pivot_z), bent by `bow` metres, or
-    `padded` as a style has it."""
-    block = cushion(low, high, padded, role="back") if padded else box(low, high, role="back", **look)
+    low: tuple, high: tuple, rake: float, pivot_y: float, pivot_z: float, *, bow: float = 0.0, **look: Any
+) -> Block:
+    """A block that is `leaned`, bent by `bow` metres."""
+    block = box(low, high, role="back", **look)
     if bow:
         block = Bow(block.centre, IDENTITY, block.material, "back", half=block.half, radius=block.radius, bow=bow)
-    turn = rotation(x=-rake)
-    pivot = np.array([0, pivot_y, pivot_z])
-    return replace(block, centre=turn @ (block.centre - pivot) + pivot, turn=turn)
+    return leaned(block, rake, pivot_y, pivot_z)
+
+
+def leaned(block: Kind, rake: float, pivot_y: float, pivot_z: float) -> Kind:
+    """The block leaning back by `rake` about the horizontal line through (pivot_y, pivot_z)."""
+    turn, pivot = rotation(x=-rake), np.array([0, pivot_y, pivot_z])
+    return replace(block, centre=turn @ (block.centre - pivot) + pivot, turn=turn @ block.turn)
 
 
 def back_rest(

@@ -10,17 +10,16 @@ import numpy as np
 
 from echomodel.files import tables
 from echomodel.furniture.bent import bent
-from echomodel.furniture.carpentry import Size, base, both, box, of_role
-from echomodel.furniture.pads import Pad, cushion
-from echomodel.furniture.seating import chair_legs, leaning, slim_arms
-from echomodel.furniture.solids import Block, Lathe, Solid, Vector, ball, rotation, superellipse, tube, turned
+from echomodel.furniture.carpentry import Size, base, between, both, box, of_role
+from echomodel.furniture.pads import CORD, Wrapped, corded, cushion
+from echomodel.furniture.seating import chair_legs, leaned, leaning, slim_arms
+from echomodel.furniture.solids import Lathe, Solid, ball, rotation, tube, turned
 from echomodel.furniture.style import Choices, Style
 from echomodel.furniture.tufting import Tufted
 
 BODIES: list[dict[str, Any]] = list(tables("bodies.toml", __file__).values())
 padded = partial(turned, material="fabric")
-CORD = 0.0058  # metres, radius of piping
-TOUCH = 0.012  # metres that cushions side by side press into one another
+TOUCH = 0.003  # metres that cushions side by side press into one another
 FLARED = 0.4  # softness up to which arms have no pad and flare
 
 
@@ -45,7 +44,7 @@ def _framed(size: Size, style: Style, seat: float, rake: float) -> list[Solid]:
     parts.append(cushion(low, high, style, turn=rotation(x=-tilt)))
     z, tall = -d * 0.36, (h - seat) / np.cos(rake)
     low, high = (-inner, seat - 0.08, z - 0.05), (inner, seat + tall, z + 0.05)
-    parts.append(leaning(low, high, rake, seat, z, padded=style))
+    parts.append(leaned(cushion(low, high, style, role="back"), rake, seat, z))
     rails = both(leaning((x - t, y - 0.06, -d * 0.44), (x, y + 0.005, d * 0.44), tilt, y, 0.0, radius=0.006))
     rails += [leaning((-x, y - 0.055, e - t / 2), (x, y, e + t / 2), tilt, y, 0.0) for e in (-d * 0.3, d * 0.4)]
     (b, c), a, up = (z - 0.05 - 0.7 * t, z - 0.046), x - 1.5 * t, seat + 0.78 * tall
@@ -58,26 +57,16 @@ def _framed(size: Size, style: Style, seat: float, rake: float) -> list[Solid]:
 
 def upholstered_arms(w: float, foot: float, y: float, d: float, arm: float, style: Style) -> list[Solid]:
     """Arms at both ends of a seat `w` wide: rolled along the top, with a pad on them, or firm ones that flare."""
-    x0, x1 = w / 2 - arm, w / 2
-    firm = replace(style, softness=min(style.softness, 0.8))
-    if style.arms == "slim" or (style.arms != "rolled" and style.softness < FLARED):
-        tall, out = y - foot, 0.2 * arm
-        lean = (x0 - out, foot, -d / 2 + 0.01), (x1 - out, y, d / 2 - 0.01)
-        return of_role("arm", both(cushion(*lean, firm, turn=rotation(z=-2 * out / tall))))
-    if style.arms != "rolled":
-        thick = 0.06 + 0.07 * style.softness
-        pad = cushion((x0 - 0.01, y - thick, -d / 2 + 0.02), (x1, y, d / 2 - 0.005), firm)
-        side = cushion(
-            (x0, foot, -d / 2 + 0.03), (x1 - 0.016, y - 0.6 * thick, d / 2 - 0.03), replace(style, softness=0.05)
-        )
-        cords = [*_piping(pad), *_piping(side, 2)] if style.piping > 0.3 else []
-        return of_role("arm", both(side, pad, *cords))
-    r = arm * 0.6
-    x = (x0 + x1) / 2 - (r - arm / 2) * 0.5
-    below = box((x0 + arm * 0.14, foot, -d / 2 + 0.03), (x1 - arm * 0.14, y - r, d / 2 - 0.02), "fabric", 0.03)
-    roll = padded((x, y - r, -d / 2 + 0.03), r, d - 0.05, rounding=0.02, turn=rotation(x=np.pi / 2))
-    scroll = padded((x, y - r, d / 2 - 0.025), 0.55 * r, 0.012, rounding=0.003, turn=rotation(x=np.pi / 2))
-    return of_role("arm", both(below, roll, scroll, *(_piping(below, 2) if style.piping > 0.3 else ())))
+    x, half, z, rolled = w / 2 - 0.5 * arm, 0.5 * arm, d / 2 - 0.015, style.arms == "rolled"
+    form: dict[str, Any] = {"head": 0.03 + 0.035 * style.softness, "power": 3.4, "stem": 1 - 0.036 / arm}
+    if rolled:
+        x, half, form = x - 0.05 * arm, 0.6 * arm, {"head": 0.6 * arm, "power": 2.0, "stem": 0.6}
+    elif style.arms == "slim" or style.softness < FLARED:
+        x, form = x - 0.2 * arm, {"head": 0.25 * arm, "power": 3.0, "turn": rotation(z=-0.4 * arm / (y - foot))}
+    made = between(Wrapped, (x - half, foot, -z), (x + half, y, z), **form)
+    low, high = (x - 0.8 * half, foot + 0.03, z - 0.014), (x + 0.8 * half, y - 0.2 * half, z + 0.014)
+    panel = between(Wrapped, low, high, **form | {"head": 0.8 * half})
+    return both(made, *[panel] * rolled, *corded(style, panel if rolled else made))
 
 
 def lounge_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -111,19 +100,7 @@ def _cushions(
     """A row of cushions from x0 to x1."""
     edges = pairwise(np.linspace(x0, x1, count + 1))
     pads = [cushion((a - TOUCH, y0, z0), (b + TOUCH, y1, z1), style, **form) for a, b in edges]
-    return [*pads, *(cord for pad in pads if pad.role == "seat" for cord in _piping(pad) if style.piping > 0.3)]
-
-
-def _piping(of: Block, axis: int = 1) -> list[Solid]:
-    """The cord, paler than its cloth, along the seam of a cushion above its side, or (axis 2) before an arm's front."""
-    if min(of.half) < 0.03:
-        return []
-    r = min(of.radius, *of.half)
-    flat, high = np.delete(of.half, axis) - r * (1 - 2**-0.5), of.half[axis] - r * (1 - 2**-0.5)
-    plan = superellipse(2 + 1.5 * min(flat) / (r + 0.01), 20) * flat
-    line = np.insert(np.concatenate([plan, plan[:1]]), axis, high, axis=1)
-    line = of.puffed(line) if isinstance(of, Pad) else line
-    return [tube(line @ of.turn.T + of.centre, CORD, "cushion", "seam")]
+    return [*pads, *corded(style, *(pad for pad in pads if pad.role == "seat"))]
 
 
 def _couch(
@@ -149,8 +126,11 @@ def _couch(
     low, high = (-w / 2 + inset, under, z0 + 0.02), (w / 2 - inset, seat - pad, z1 - 0.03)
     parts.append(box(low, high, "fabric", 0.015 if body.get("skirt") else 0.045, "base"))
     tall = h - (0.06 if seats > 1 and style.contrast < 0.6 else 0.0)
-    low, high = (-w / 2 + arm * 0.4, foot + 0.02, z0), (w / 2 - arm * 0.4, tall, z0 + frame)
-    parts.append(leaning(low, high, 0.5 * style.rake, seat, z0 + frame / 2, padded=style))
+    x = w / 2 - max(0.4 * arm, 0.012)
+    low, high, across = (-z0 - frame, foot + 0.02, -x), (-z0, tall, x), rotation(y=np.pi / 2)
+    board = between(Wrapped, low, high, head=min(0.3 * frame, 0.045), power=3.0, role="back")
+    board = replace(board, centre=across @ board.centre, turn=across)
+    parts.append(leaned(board, 0.5 * style.rake, seat, z0 + frame / 2))
     if arm:
         parts += upholstered_arms(w, foot, y_arm, d, arm, style)
     inner = w / 2 - arm
@@ -167,7 +147,7 @@ def _couch(
     else:
         thick, turn = 0.12 + 0.08 * style.softness, rotation(x=-0.12 - 0.3 * style.rake)
         far, near, high = z0 + frame - 0.2 * thick, z0 + frame + 0.8 * thick, h if back == "pads" else 0.94 * h
-        parts += _cushions(-inner, inner, seat - 0.02, high, far, near, seats, style, turn=turn, role="back")
+        parts += _cushions(-inner, inner, seat - 0.045, high, far, near, seats, style, turn=turn, role="back")
     if back == "roll" and seats > 1 and not chaise:
         place, turn = (inner - 0.085, seat + 0.08, z0 + 0.7 * frame), rotation(x=np.pi / 2)
         parts += both(padded(place, 0.08, min(0.52, 0.6 * d), rounding=0.02, turn=turn, role="cushion"))
@@ -212,23 +192,10 @@ def _curved(size: Size, style: Style, stand: Sequence[Solid] = (), seat: float =
     seat, arms = min(seat, h * 0.6), (h - foot) * (0.58 + 0.3 * style.arm_height)
     parts = [*(stand or _legs(style, w * 0.78, d * 0.8, foot))]
     parts.append(bent((0, foot, d * 0.4), (w / 2, d * 0.9), wall, h - foot, arms, power=power, ease=2.8))
-    tall, form = seat - foot, {"power": power + 1}
-    parts.append(padded((0, foot, 0), (w / 2 - wall * 0.7, d * 0.45), tall * 0.62, role="base", **form))
-    form["rounding"] = 0.05 * style.softness
-    middle, half = (0, foot + tall * 0.6, d * 0.04), (w / 2 - wall, d * 0.44)
-    cushioned = padded(middle, half, tall * 0.4, role="seat", **form)
-    return [*parts, cushioned, *_seams(middle, half, tall * 0.4, power + 1, 0.35 * form["rounding"])]
-
-
-def _seams(middle: Vector, half: tuple[float, float], tall: float, power: float, r: float) -> list[Solid]:
-    """Cords on a round seat: around its upper edge, and over a wide one from back to front between its places."""
-    a, b, top = half[0] - r, half[1] - r, tall - 0.3 * r
-    around = np.insert(superellipse(power, 28) * (a, b), 1, top, axis=1)
-    lines, count = [np.concatenate([around, around[:1]])], max(1, round(2 * a / 0.75))
-    for x in np.linspace(-a, a, count + 1)[1:-1]:
-        deep = b * (1 - abs(x / a) ** power) ** (1 / power)
-        lines.append(np.array([[x, tall, -0.9 * deep], [x, tall, deep - r], [x, top, deep], [x, 0.02, deep + r]]))
-    return [tube(line + middle, CORD, "cushion", "seam") for line in lines]
+    level, x, z, form = foot + 0.62 * (seat - foot), w / 2 - wall, d * 0.44, power + 1
+    parts.append(padded((0, foot, 0), (x + 0.3 * wall, d * 0.45), level - foot, role="base", power=form))
+    cushioned = cushion((-x, level, d * 0.04 - z), (x, seat, d * 0.04 + z), style, power=form)
+    return [*parts, cushioned, *corded(style, cushioned)]
 
 
 def l_shaped_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -259,7 +226,7 @@ def chaise_longue_sofa(size: Size, style: Style, choices: Choices) -> list[Solid
     parts.append(box(low, high, "fabric", 0.02, "base"))
     parts.append(cushion((-w / 2, seat - pad, -d / 2 + 0.1), (w / 2, seat, d / 2), style))
     low, high, pivot = (-w / 2, seat - pad, -d / 2), (w / 2, h, -d / 2 + 0.15), (seat - pad, -d / 2 + 0.08)
-    parts.append(leaning(low, high, 0.15 + style.rake, *pivot, padded=style))
+    parts.append(leaned(cushion(low, high, style, role="back"), 0.15 + style.rake, *pivot))
     if choices.chance("extra", 0.6):
         s = -1 if choices.chance("side", 0.5) else 1
         x0, x1 = sorted((s * w / 2, s * (w / 2 - 0.13)))

@@ -64,6 +64,7 @@ class Solid:
         material: names its look. role: what it is in the piece: leg, top, seat, drawer, handle ...
         joint: how it moves, None = it is fixed.
         core: fills what boards enclose, so that a coarse grid sees one body; it has distances and no mesh.
+        gives: metres, and the most as a share of its height, that its top is less full under what lies on it.
         soft: it is filled or hangs. draped: it lies in folds, which shade as one surface.
     """
 
@@ -75,11 +76,7 @@ class Solid:
     role: str = ""
     joint: Joint | None = None
     core: bool = False
-
-    @property
-    def gives(self) -> tuple[float, float]:
-        """Metres, and the most as a share of its height, that its top is less full under what lies on it."""
-        return 0.015, 0.1
+    gives: tuple[float, float] = (0.015, 0.1)
 
     def mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         """Vertices (n, 3) in the object's frame and outward faces (m, 3) of the closed surface."""
@@ -118,8 +115,7 @@ class Block(Solid):
         corner = (np.minimum(node, 0) + np.maximum(node - 1, 0)) / steps
         corner = np.sign(corner) * np.tan(np.abs(corner) * np.pi / 4)
         length = np.linalg.norm(corner, axis=1, keepdims=True)
-        core = np.clip(node, 0, 1) * 2 - 1
-        return core * (self.half - r) + r * corner / np.maximum(length, 1e-12), faces
+        return (np.clip(node, 0, 1) * 2 - 1) * (self.half - r) + r * corner / np.maximum(length, 1e-12), faces
 
 
 @dataclass(frozen=True, eq=False)

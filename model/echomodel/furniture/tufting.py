@@ -45,8 +45,7 @@ class Tufted(Block):
         vertices, faces = closed(points, faces, border, (0.0, 0.0, -d))
         knob, sides = loft([np.insert(superellipse(2.0, 6)[::-1] * wide, 2, high, axis=1) for wide, high in BUTTON])
         more = (sides + len(knob) * np.arange(len(buttons))[:, None, None] + len(vertices)).reshape(-1, 3)
-        vertices = np.concatenate([vertices, (buttons[:, None] + knob).reshape(-1, 3)])
-        return vertices, np.concatenate([faces, more])
+        return np.concatenate([vertices, (buttons[:, None] + knob).reshape(-1, 3)]), np.concatenate([faces, more])
 
 
 def _rounded_line(half: float, r: float, cells: int) -> tuple[Array, Array, Array]:
