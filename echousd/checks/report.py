@@ -6,6 +6,7 @@ import importlib
 import os
 import warnings
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -74,11 +75,13 @@ def find_faults(reading: Reading) -> tuple[tuple[Fault, ...], tuple[Fault, ...]]
     """
     assert echousd.__version__  # importing the package registers the schema plugin
     stage = reading.stage
-    own = [(rule, found) for rule in RULES for found in safely(rule, reading)]
+    with ThreadPoolExecutor(1) as beside:  # OpenUSD lets go of Python's lock
+        theirs = beside.submit(_faults_of_usd, reading)
+        own = [(rule, found) for rule in RULES for found in safely(rule, reading)]
     with showing_variant(stage, ARTICULATION, ARTICULATED) as changed:  # doors and drawers are joined in it alone
         joined = Reading(stage)
         own += [(rule, found) for rule in JOINED if changed for found in safely(rule, joined)]
-    errors, warnings = _faults_of_usd(reading)
+    errors, warnings = theirs.result()
     for rule, found in own:
         (warnings if found.warning else errors).add(Fault(rule.name, str(found.path), found.message))
     return tuple(sorted(errors)), tuple(sorted(warnings))

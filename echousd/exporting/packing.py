@@ -5,7 +5,7 @@ import os
 import struct
 import warnings
 import zipfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path, PurePosixPath
@@ -38,6 +38,7 @@ class Reach:
 
     room: Path
     places: tuple[Path, ...]
+    _real: Callable[[str], str] = field(default_factory=lambda: cache(os.path.realpath), compare=False)  # of folders
 
     @classmethod
     def of(cls, stage: Usd.Stage, search: Sequence[str | os.PathLike[str]] = ()) -> "Reach":
@@ -49,7 +50,9 @@ class Reach:
 
     def holds(self, path: str) -> bool:
         """Whether a file, all links followed, lies in reach."""
-        real = Path(os.path.realpath(file_of(path)))
+        folder, name = os.path.split(file_of(path))
+        real = Path(self._real(folder), name)
+        real = real.resolve() if name == ".." or real.is_symlink() else real
         return any(map(real.is_relative_to, self.places)) or store_above(real) is not None
 
     def check(self, path: str, where: str) -> None:
@@ -100,11 +103,7 @@ class Package:
         return self.names[path]
 
     def _file(self, path: str, where: str, name: str = "") -> str:
-        try:
-            there = file_of(path).exists()
-        except (OSError, ValueError):
-            there = False
-        if not there:
+        if not os.path.exists(file_of(path)):  # noqa: PTH110  # nor where the text can be no path
             return ""
         self.reach.check(path, where)
         inside = Ar.SplitPackageRelativePathInner(path)[1] or path
@@ -130,9 +129,7 @@ class Package:
         return f"./{self.folder}/{pattern}" if any(packed) else ""
 
     def _unused(self, name: str) -> str:
-        taken = {used.casefold() for used in self.content} | {
-            PurePosixPath(used).name.casefold() for used in self.names.values()
-        }
+        taken = {PurePosixPath(used).name.casefold() for used in (*self.content, *self.names.values())}
         stem, ending = os.path.splitext(name)  # noqa: PTH122  # a name with `<UDIM>`, no path
         return free_name(stem, lambda one: f"{one}{ending}".casefold() in taken) + ending
 

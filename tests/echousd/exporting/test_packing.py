@@ -14,7 +14,7 @@ from pxr import Usd
 
 from echousd.draw.drawables import read_drawables
 from echousd.exporting.formats import export
-from echousd.exporting.packing import LeftOut
+from echousd.exporting.packing import LeftOut, Reach
 from echousd.textures import read_image
 
 SQUARE = """
@@ -158,6 +158,20 @@ def test_links_and_layers_that_lead_outside_are_refused(tmp_path):
     for ending in ("usdz", "usda", "glb"):
         with pytest.raises(ValueError, match=r"a layer of </Room/Taken> names .*private\.usda"):
             export(root, tmp_path / f"room.{ending}")
+
+
+def test_links_of_files_and_folders_and_the_way_up_are_followed(tmp_path):
+    root = room(tmp_path / "in", {})
+    paint(tmp_path / "in" / "own.png", (1, 2, 3))
+    (tmp_path / "in" / "own_link.png").symlink_to("own.png")
+    (tmp_path / "in" / "out").symlink_to(tmp_path)
+    (tmp_path / "out_link.png").symlink_to(paint(tmp_path / "secret.png", (1, 2, 3)))
+    (tmp_path / "in" / "out_link.png").symlink_to(tmp_path / "secret.png")
+    reach = Reach.of(Usd.Stage.Open(str(root)))
+    held = [name for name in ("own.png", "own_link.png", "gone.png", ".") if reach.holds(f"{tmp_path}/in/{name}")]
+    assert held == ["own.png", "own_link.png", "gone.png", "."]
+    for name in ("..", "../secret.png", "out", "out/secret.png", "out/out_link.png", "out_link.png", "out/in/../x"):
+        assert not reach.holds(f"{tmp_path}/in/{name}"), name
 
 
 def test_a_package_names_nothing_beside_itself(tmp_path):
