@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from echomodel.triangles import along
+from echomodel.triangles import along, unit
 from echousd.draw.indoors import LUMA, Bounced
 from echousd.draw.scenery import Scenery
 from echousd.draw.views import View
@@ -158,10 +158,6 @@ def on_sphere(square: np.ndarray) -> np.ndarray:
     height = 2 * square[0] - 1
     radius, angle = np.sqrt(np.clip(1 - height**2, 0, 1)), np.float32(2 * np.pi) * square[1]
     return np.stack([radius * np.cos(angle), height, radius * np.sin(angle)])
-
-
-def unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.sqrt(np.maximum(along(vectors, vectors), 1e-18))
 
 
 def _rows(vectors: np.ndarray) -> np.ndarray:

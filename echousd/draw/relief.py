@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from echomodel.triangles import along
+from echomodel.triangles import along, unit
 from echousd.draw.indoors import LUMA
-from echousd.draw.rays import unit
 from echousd.draw.scenery import RELIEF, Scenery
 
 NORMAL = np.arange(256, dtype=np.float32) / 127.5 - 1  # of a byte of an image of normals

@@ -7,22 +7,9 @@ import numpy as np
 from PIL import Image, ImageFilter
 
 from echomodel.late import lates
-from echomodel.triangles import along
+from echomodel.triangles import along, unit
 from echousd.draw.indoors import DIM, GLOWING, LUMA, OWN, RIM, SUN, Bounced, evened, exposure, rolled
-from echousd.draw.rays import (
-    BLOCK,
-    Seen,
-    World,
-    camera_rays,
-    embree,
-    even,
-    first_hit,
-    free,
-    on_sphere,
-    shifts,
-    unit,
-    way_to,
-)  # fmt: skip
+from echousd.draw.rays import BLOCK, Seen, World, camera_rays, embree, even, first_hit, free, on_sphere, shifts, way_to
 from echousd.draw.scenery import CLOTH, SKY_LIGHT, Scenery, next_room, outside
 from echousd.draw.smoothing import RINGS, same_surface, smooth_light
 from echousd.draw.views import View
@@ -37,6 +24,10 @@ PLACES, OFTEN, TURNS = (600, 1200), 3, 5
 # Metres from which on what stands near throws on all of its light, which is in a shadow itself, and of how much it
 # throws on more if it is white; what any surface mirrors of all around it.
 CREVICE, PALE, SHEEN = 1.0, 0.55, 0.05
+# In fine pictures what is met within so many metres throws on what falls just there, of which two places of the unit
+# square are asked that depend on the first only by so much; and so much of the width on either side of an edge is
+# asked more often and smoothed less, as shadows of feet are small.
+NEAR, SCATTERED, BAND = np.float32(0.5), (np.float32(1021), np.float32(769)), 0.004
 # Gloss from which on surfaces mirror, and are metal, of which so much is not mirrored; how far from where a mirror
 # would a rough one mirrors.
 GLOSSY, METAL, MATT, BLUR = 0.2, 0.5, 0.4, 0.15
@@ -113,7 +104,7 @@ def _blended(seen: Seen, color: np.ndarray, tone: Callable[[np.ndarray], np.ndar
 
 # Pixels to the right and down, near ones first.
 BESIDE = np.array(sorted(product(range(-2, 3), repeat=2), key=lambda at: at[0] ** 2 + at[1] ** 2)[:13])
-POOL, CORNERS = 0.15, np.array(list(product((0, 1), repeat=3)))  # metres; of a cell of these
+POOL, CORNERS = (0.15, 0.05), np.array(list(product((0, 1), repeat=3)))  # metres; of a cell of these
 # metres before a surface, from where on it is no more in the way of its own light; and of what cloth is thick
 BEFORE, THICK = np.float32(2e-3), np.float32(0.016)
 # Of thin cloth before a pane: metres behind it where one begins to see, the share of what is there, the power of the
@@ -233,19 +224,27 @@ def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, ofte
     asked, torn, number = met[coarse], edge.reshape(shape)[coarse], np.arange(met.size).reshape(shape)[coarse]
     found = np.zeros((world.rows + 1, asked.size), np.float32)  # the last: whether the sun shines
     known = [normal[coarse].copy(), point[coarse].copy()]
+    share = np.zeros_like(torn, np.float32)  # of what is smoothed less, as light changes from place to place there
+    if world.fine:
+        wide, band = Image.fromarray(np.where(torn, np.uint8(255), np.uint8(0))), round(BAND * world.size)
+        wide = wide.filter(ImageFilter.MaxFilter(2 * band + 1)).filter(ImageFilter.BoxBlur(band))
+        share = np.asarray(wide, np.float32) / np.float32(255)
+        torn, often = share > 0, often * 3 // 2
     for here, times in ((asked & torn, often), (asked & ~torn, seldom)):
         found[:-1, here.ravel()] = _asked(world, seen.of(number[here]), number[here], times)
     thin = np.flatnonzero(asked & near.reshape(shape)[coarse])
     raw, slim = found[:-1, thin], number.ravel()[thin]
     smooth = np.arange(world.rows) != 4
-    found[np.ix_(np.flatnonzero(smooth), thin)] = _pooled(seen.of(slim), raw[smooth])
+    found[np.ix_(np.flatnonzero(smooth), thin)] = _pooled(seen.of(slim), raw[smooth], world.fine)
     found[-1] = found[4] > 0
     gloss = world.scenery.gloss.take(seen.face).reshape(shape)[coarse]
     reach = (
-        (np.s_[:3], RINGS), (np.s_[3:4], RINGS[:3], gloss), (np.s_[4:5], () if inside else RINGS),
-        (np.s_[5:-1], RINGS if world.fine else ()), (np.s_[-1:], RINGS[:1]),
+        (np.s_[:3], RINGS[:2]), (np.s_[3:4], RINGS[:3], gloss), (np.s_[4:5], () if inside else RINGS),
+        (np.s_[5:-1], RINGS[:2] if world.fine else ()), (np.s_[-1:], RINGS[:1]),
     )  # fmt: skip
     found = smooth_light(found.reshape(-1, *asked.shape), known[0], known[1], reach)
+    far = ((np.s_[:3], RINGS[2:]), (np.s_[5:-1], RINGS[2:] if world.fine else ()))
+    found += (1 - share) * (smooth_light(found.copy(), known[0], known[1], far) - found)
     mixed = ((found[-1] > 0.01) & (found[-1] < 0.99)).repeat(2, 0).repeat(2, 1)[: shape[0], : shape[1]]
     light, weight = np.zeros((world.rows, *shape), np.float32), np.zeros(shape, np.float32)
     there, *known, found = (
@@ -264,7 +263,7 @@ def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, ofte
     rest, flat = np.flatnonzero(met & (weight == 0)), light.reshape(world.rows, -1)
     # with what was asked of slim things beside them: alone they would be lighter and darker dashes along a trim
     more = np.concatenate([_asked(world, seen.of(rest), rest, often // 2), raw], 1)
-    flat[:, rest] = _pooled(seen.of(np.concatenate([rest, slim])), more)[:, : len(rest)]
+    flat[:, rest] = _pooled(seen.of(np.concatenate([rest, slim])), more, world.fine)[:, : len(rest)]
     border = np.flatnonzero(met & mixed & inside)  # of the sun's light: sharper than two pixels
     facing, shift = seen.normal.take(border, 1), shifts(world, border)[:2]
     there = seen.point.take(border, 1) + BEFORE * facing
@@ -272,12 +271,12 @@ def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, ofte
     return smooth_light(light, normal, point, ((np.s_[:], RINGS[:1]),)).reshape(world.rows, -1)
 
 
-def _pooled(seen: Seen, light: np.ndarray) -> np.ndarray:
+def _pooled(seen: Seen, light: np.ndarray, fine: bool) -> np.ndarray:
     """(c, n) light on what was seen: its mean over what faces the same way within `POOL` metres, the nearer the more.
 
     Places lie between the corners of cells, which they add their light to, and take the mean from.
     """
-    place = seen.point / POOL
+    place = seen.point / np.float32(POOL[fine])
     low = np.floor(place)
     cell = (1 << np.arange(48, 0, -8)) @ np.concatenate([low, np.rint(2 * seen.normal) + 2]).astype(np.int64)
     share = np.stack([1 + low - place, place - low])
@@ -300,7 +299,7 @@ def _lent(world: World, more: Seen, pixel: np.ndarray, seen: Seen, light: np.nda
         out[:, wanted[fits]] = light.take(other[fits], 1)
         wanted = wanted[~fits]
     rest, pixel = more.of(wanted), pixel[wanted]
-    out[:, wanted] = _pooled(rest, _asked(world, rest, pixel, 1))
+    out[:, wanted] = _pooled(rest, _asked(world, rest, pixel, 1), world.fine)
     return out
 
 
@@ -358,8 +357,7 @@ def _light(world: World, seen: Seen, sample: int, shift: np.ndarray) -> np.ndarr
     share = world.scenery.thin.take(seen.face)
     if len(cloth := np.flatnonzero(share)):  # which light comes through
         point, normal, *spots = (each.take(cloth, 1) for each in (*at, *spots))
-        some, sun = _direct(world, point - THICK * normal, -normal, *spots)
-        soft[:3, cloth] += share.take(cloth) * (some[:3] + sun * world.sun[:, None])
+        soft[:3, cloth] += share.take(cloth) * _fallen(world, point - THICK * normal, -normal, *spots)
     for ray in range(AROUND):
         soft += _gathered(world, *at, even(sample * AROUND + ray, shift[2:])) / AROUND
     out[:3] = soft[:3] + np.float32(DIM * max(world.scenery.lights.sky, 0.1)) * world.tint
@@ -431,18 +429,41 @@ def _sunny(world: World, point: np.ndarray, normal: np.ndarray, spot: np.ndarray
     return free(world.scene, point, towards, np.full(len(facing), 1e3, np.float32), facing > 0) * facing
 
 
+def _fallen(world: World, *at: np.ndarray) -> np.ndarray:
+    """(3, n) what comes from windows, lamps and the sun to points, as `_direct` takes them."""
+    soft, sun = _direct(world._replace(fine=False), *at)
+    return np.asarray(soft + sun * world.sun[:, None])
+
+
 def _gathered(world: World, point: np.ndarray, normal: np.ndarray, square: np.ndarray) -> np.ndarray:
     """(3, n) what surfaces throw on points by one ray each, which goes to `square` (2, n), see `CREVICE`; if fine as
-    `slanted` has it."""
+    `slanted` has it, and what is met within `NEAR` metres throws on what falls just there, not on what does around."""
     way = unit(normal + on_sphere(square))  # cosine-weighted
     face, far, _ = first_hit(world, point, way)
     rows = world.thrown.rows(point, way, far, world.scenery.planes.axis.take(face))
     thrown, missed = world.thrown.radiance.take(rows, 1), np.flatnonzero(face < 0)
     thrown[:, missed] = 0 if world.view.inside else (0.92 + 0.35 * way[1].take(missed)) * SKY_LIGHT[:, None]
-    pale, far[missed] = PALE * world.scenery.planes.luma.take(face), CREVICE
-    far[world.scenery.thin.take(face) > 0] = CREVICE  # light comes through
-    thrown *= pale + (1 - pale) * np.minimum(far / np.float32(CREVICE), 1)
-    return slanted(thrown, way, normal) if world.fine else thrown
+    thin = (world.scenery.thin.take(face) > 0) | (face < 0)  # light comes through
+    pale, full = PALE * world.scenery.planes.luma.take(face), np.where(thin, np.float32(CREVICE), far)
+    thrown *= pale + (1 - pale) * np.minimum(full / np.float32(CREVICE), 1)
+    if not world.fine:
+        return thrown
+    near = np.flatnonzero((full < NEAR) & world.view.inside)
+    onto, albedo = (each.take(near, 1) for each in (way, world.scenery.planes.color.take(face, 1)))
+    at = _before(world, point.take(near, 1), onto, face.take(near), far.take(near))
+    first, second = (square.take(near, 1) * scale % 1 for scale in SCATTERED)
+    light = _fallen(world, *at, first, second) + _gathered(world._replace(fine=False), *at, second[::-1])
+    thrown[:, near] = albedo * light
+    return slanted(thrown, way, normal)
+
+
+def _before(
+    world: World, origin: np.ndarray, way: np.ndarray, face: np.ndarray, far: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points (3, n) just before faces that rays met, and these' normals towards where they came from."""
+    normal = world.scenery.planes.normal[:3].take(face, 1)
+    normal *= -np.sign(along(normal, way))
+    return origin + far * way + BEFORE * normal, normal
 
 
 def _lit(world: World) -> World:
@@ -450,7 +471,7 @@ def _lit(world: World) -> World:
 
     Light is found at places that an eye in it and those places see, and thrown on `TURNS` times.
     """
-    rng, normals = np.random.default_rng(0), world.scenery.planes.normal[:3]
+    rng, coarse = np.random.default_rng(0), world._replace(fine=False)
     point, normal = world.view.start[:, None].astype(np.float32), np.zeros((3, 1), np.float32)
     met: list[tuple[np.ndarray, ...]] = []
     for count in PLACES:  # from the eye all around or, where it is outside, ahead, then from what it sees
@@ -463,9 +484,7 @@ def _lit(world: World) -> World:
         face, far, _ = first_hit(world, origin, way)
         there = np.flatnonzero(face >= 0)
         origin, way, face, far = (each.take(there, -1) for each in (origin, way, face, far))
-        normal = normals.take(face, 1)
-        normal *= -np.sign(along(normal, way))
-        point = origin + far * way + BEFORE * normal
+        point, normal = _before(world, origin, way, face, far)
         rows = world.thrown.rows(origin, way, far, world.scenery.planes.axis[face])
         met.append((point, normal, rows, world.scenery.planes.color.take(face, 1)))
         if not len(there):
@@ -473,15 +492,14 @@ def _lit(world: World) -> World:
     point, normal, rows, albedo = (np.concatenate(values, -1) for values in zip(*met, strict=True))
     often = np.tile(point, OFTEN), np.tile(normal, OFTEN)
     spots = rng.random((OFTEN, 2, len(rows), 2), np.float32).transpose(1, 3, 0, 2).reshape(2, 2, -1)
-    some, sun = _direct(world, *often, *spots)
-    direct = (some[:3] + sun * world.sun[:, None]).reshape(3, OFTEN, -1).mean(1)
+    direct = _fallen(world, *often, *spots).reshape(3, OFTEN, -1).mean(1)
     light = np.zeros_like(point)
     for _ in range(TURNS):
-        world = world._replace(thrown=world.thrown.lit(rows, albedo * (direct + light)))
+        coarse = coarse._replace(thrown=coarse.thrown.lit(rows, albedo * (direct + light)))
         squares = rng.random((OFTEN, len(rows), 2), np.float32).transpose(2, 0, 1).reshape(2, -1)
-        light = _gathered(world, *often, squares)[:3].reshape(3, OFTEN, -1).mean(1)
+        light = _gathered(coarse, *often, squares).reshape(3, OFTEN, -1).mean(1)
     white, emissive = (direct + light).mean(1), world.scenery.emissive
     # shades of the room's whole colour would be yellower than what they light
     tinted = white**0.8 * (white @ LUMA) ** 0.2
     glow = np.interp(world.scenery.lights.day, (0, 1), GLOWING) * tinted / float((emissive @ LUMA).max(initial=1e-6))
-    return world._replace(glow=glow.astype(np.float32), white=white)
+    return world._replace(thrown=coarse.thrown, glow=glow.astype(np.float32), white=white)

@@ -18,14 +18,7 @@ from echousd.graph.arrays import graph_batch, one_thread
 from echousd.graph.floors import with_lowered_windows
 from echousd.make.clearing import cleared_layouts
 from echousd.make.finished import Room
-from echousd.make.layouts import (
-    LayoutSearch,
-    finished_boxes,
-    most_drafts,
-    plan_boxes,
-    room_floor,
-    with_free_openings,
-)
+from echousd.make.layouts import LayoutSearch, finished_boxes, most_drafts, plan_boxes, room_floor, with_free_openings
 from echousd.make.verdicts import layout_outcome
 from echousd.naming import free_name
 from echousd.options import RoomOptions

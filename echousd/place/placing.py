@@ -13,14 +13,7 @@ from echomodel.graph import Stated
 from echomodel.late import Late
 from echomodel.objective import TERMS
 from echomodel.objective.plan import kind_of
-from echomodel.objective.sizes import (
-    fitting_loads,
-    hung_lamps,
-    in_proportion,
-    laid_tables,
-    smaller_sizes,
-    usual_sizes,
-)
+from echomodel.objective.sizes import fitting_loads, hung_lamps, in_proportion, laid_tables, smaller_sizes, usual_sizes
 from echomodel.objective.support import ON_FLOOR
 from echomodel.openings import Opening, signed_area
 from echomodel.rules import margins, verdicts

@@ -8,17 +8,7 @@ import shapely
 
 from echomodel.openings import SLID, Opening, zone
 from echomodel.triangles import Mesh, joined
-from echousd.shapes.fittings import (
-    BEAM,
-    TRACK,
-    WALL,
-    board,
-    leaf_of,
-    lights_of,
-    upright,
-    window_frame,
-    window_glass,
-)  # fmt: skip
+from echousd.shapes.fittings import BEAM, TRACK, WALL, board, leaf_of, lights_of, upright, window_frame, window_glass
 
 BAY = (0.35, 0.45)  # of a bay window: along the wall to where its front begins, and how far that is before it
 BETWEEN = 1.0  # metres from one beam to the next

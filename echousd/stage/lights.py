@@ -12,7 +12,7 @@ MAX_STOPS = 60  # of exposure, either way
 # ceiling, where the sky is seen through the windows alone. The sun is its irradiance: through windows alone a white
 # surface that faces it gains 0.45, about what the sky gives; over walls without a ceiling, which have the sky already,
 # so much would leave them blank.
-SHARES = {"open": (1.0, 1.0, 0.55), "walls": (1.4, 0.12, 0.55), "ceiling": (3.6, 0.95, 1.4)}
+SHARES = {"open": (1.0, 1.0, 0.55), "walls": (1.4, 0.12, 0.55), "ceiling": (4.8, 0.54, 1.9)}
 
 
 def emitted(prim: Usd.Prim, metres: float) -> np.ndarray:

@@ -85,6 +85,11 @@ def along(one: Sequence[np.ndarray] | np.ndarray, other: Sequence[np.ndarray] | 
     return np.asarray(one[0] * other[0] + one[1] * other[1] + one[2] * other[2])
 
 
+def unit(vectors: np.ndarray) -> np.ndarray:
+    """Vectors (3, ...) of length 1 along some (3, ...)."""
+    return np.asarray(vectors / np.sqrt(np.maximum(along(vectors, vectors), 1e-18)))
+
+
 def lengths(vectors: np.ndarray) -> np.ndarray:
     """(...): the lengths of vectors (..., 3), bit for bit as `np.linalg.norm` has them row by row."""
     planes = vectors[..., 0], vectors[..., 1], vectors[..., 2]

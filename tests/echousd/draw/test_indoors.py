@@ -12,9 +12,10 @@ from pxr import Gf, Usd, UsdGeom, UsdLux
 from small_room import BARE, StandIn, small_graph
 
 import echousd
+from echousd.draw import tracing
 from echousd.draw.drawables import image_of
 from echousd.draw.from_files import render
-from echousd.draw.indoors import BRIGHT, CONTRAST, LUMA, SHARE, evened, exposure, read_lights, with_ceiling
+from echousd.draw.indoors import BRIGHT, LUMA, SHARE, evened, exposure, read_lights, with_ceiling
 from echousd.draw.rendering import render_stage
 from echousd.draw.scenery import CLOTH, SHEER, read_scenery
 from echousd.draw.tracing import trace
@@ -259,7 +260,7 @@ def test_a_fine_pattern_is_an_even_tone_from_afar_and_seen_from_near(tmp_path):
 @pytest.mark.parametrize("lit", ["lamp", "sun"])
 def test_an_image_of_normals_turns_a_surface_as_if_it_were_turned(tmp_path, lit):
     if lit == "lamp":
-        scenery, down = box_room(sky=0.0, bulbs=np.array([[(1.0, 0.8, 0.0)]], "f4"), power=np.ones((1, 3), "f4"))
+        scenery, down = box_room(sky=0.0, bulbs=np.array([[(1.0, 1.4, 0.0)]], "f4"), power=np.ones((1, 3), "f4"))
     else:
         towards = np.array([(0.6, 0.8, 0.0), (1.0, 1.0, 1.0)], np.float32)
         scenery, down = box_room(sky=0.2, sun=towards)
@@ -273,13 +274,46 @@ def test_an_image_of_normals_turns_a_surface_as_if_it_were_turned(tmp_path, lit)
         ahead = np.array([np.sin(turn), 0, np.cos(turn)])  # to the right of the image, +x
         Image.new("RGB", (8, 8), tuple(np.rint(127.5 * (ahead + 1)).astype(int))).save(tmp_path / "normal.png")
         image = (partial(image_of, "/Normal", str(tmp_path / "normal.png")), np.ones(3, np.float32))
-        drawn = with_sheet(replace(scenery, images=(image,)), level_sheet(0.4, 0.4), texture=np.array([(-1, 0)] * 2))
+        drawn = with_sheet(
+            replace(scenery, images=(image,)), level_sheet(0.4, 0.4, y=0.6), texture=np.array([(-1, 0)] * 2)
+        )
         about = np.array([(np.cos(turn), -np.sin(turn), 0), (np.sin(turn), np.cos(turn), 0), (0, 0, 1)])
-        turned = with_sheet(scenery, level_sheet(0.4, 0.4, y=0.0) @ about + (0, 0.1, 0))
+        turned = with_sheet(scenery, level_sheet(0.4, 0.4, y=0.0) @ about + (0, 0.6, 0))
         seen.append([trace(one, down, 160, rays=3)[76:84, 76:84].mean() for one in (drawn, turned)])
     (away, _), (level, _), (towards, _) = seen
     assert away < 0.98 * level < 0.98**2 * towards
     assert [drawn for drawn, _ in seen] == pytest.approx([turned for _, turned in seen], rel=0.03)
+
+
+PANEL = {
+    "bulbs": np.zeros((0, 24, 3), np.float32), "power": np.zeros((0, 3), np.float32),
+    "panels": np.array([[(0.0, 2.9, 0.0), (1.5, 0.0, 0.0), (0.0, 0.0, 1.5), (0.3, 0.3, 0.3)]], np.float32),
+}  # fmt: skip
+
+
+def test_fine_pictures_are_darker_beside_what_is_black_than_cells_of_light_tell(monkeypatch):
+    scenery, _ = box_room(sky=0.0, **PANEL)
+    eye = View(view_matrix(np.array([0.3, 1.2, 0.0]), np.array([1.78, 0.0, 0.0])), 0.25, False, inside=True)
+    strip = np.array([(1.85, 0.0, -0.5), (1.85, 0.0, 0.5), (1.85, 0.1, 0.5), (1.85, 0.1, -0.5)])
+    taken = []
+    for near in (tracing.NEAR, np.float32(0)):
+        monkeypatch.setattr(tracing, "NEAR", near)
+        tones = (with_sheet(scenery, strip, flat_colors=np.full((2, 3), tone)) for tone in (0.0, 0.8))
+        black, white = (trace(one, eye, 160, rays=3)[80:96, 70:90].mean() for one in tones)  # the floor before it
+        taken.append(1 - black / white)
+    assert taken[0] > 1.5 * taken[1] > 0
+
+
+def test_fine_pictures_keep_small_shadows_where_things_stand(monkeypatch):
+    scenery, _ = box_room(sky=0.0, **PANEL)
+    eye = View(view_matrix(np.array([0.0, 0.8, 1.2]), np.array([0.0, 0.0, 0.0])), 0.25, False, inside=True)
+    darkest = []
+    for band, pool in ((tracing.BAND, tracing.POOL), (0.0, (tracing.POOL[0],) * 2)):
+        monkeypatch.setattr(tracing, "BAND", band)
+        monkeypatch.setattr(tracing, "POOL", pool)
+        picture = trace(with_sheet(scenery, level_sheet(0.08, 0.08, y=0.04)), eye, 480, rays=3)
+        darkest.append(picture[200:330, 235:245].mean((1, 2)).min())  # of the floor below it
+    assert darkest[0] < 0.92 * darkest[1]
 
 
 def test_what_shines_is_spread_a_little_over_what_is_beside_it(monkeypatch):
@@ -324,15 +358,19 @@ def test_a_bar_thinner_than_a_pixel_has_no_gaps():
     assert darker.min() > 0.35 * np.median(darker)
 
 
-def test_a_thin_slanting_trim_is_as_even_as_what_lights_it():
+def test_a_thin_slanting_trim_is_as_even_as_what_lights_it(monkeypatch):
     lamps = np.array([(x, 1.5, z) for x in (-1.5, 1.5) for z in (-1.5, 1.5)], np.float32)
     scenery, down = box_room(sky=0.0, bulbs=lamps[:, None], power=np.ones((4, 3), np.float32))
     turn = np.array([[np.cos(0.3), 0, np.sin(0.3)], [0, 1, 0], [-np.sin(0.3), 0, np.cos(0.3)]])
     corners = level_sheet(2.4, 0.05, y=0.3) @ turn  # two pixels wide
     glowing = trace(with_sheet(scenery, corners, emissive=np.ones((2, 3))), down, 160, rays=1)
     trim, here = with_sheet(scenery, corners), glowing.min(-1) > 0.8
-    pictures = [trace(trim, down, 160, rays=2, seed=seed).mean(-1)[here] for seed in range(6)]
-    assert np.std(pictures, axis=0).mean() < 0.0117 * CONTRAST  # 0.0135 where each is lit by what it asked alone
+    noise = []
+    for pooled in (tracing._pooled, lambda seen, light, fine: light):  # and where each is lit by what it asked alone
+        monkeypatch.setattr(tracing, "_pooled", pooled)
+        pictures = [trace(trim, down, 160, rays=2, seed=seed).mean(-1)[here] for seed in range(6)]
+        noise.append(np.std(pictures, axis=0).mean())
+    assert noise[0] < 0.87 * noise[1]
 
 
 def test_the_rim_of_what_is_round_is_lit_as_what_is_beside_it():
