@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 SUN = 4 * np.array([1.12, 1.0, 0.78], np.float32)
 CEILING = np.array([0.87, 0.86, 0.84], np.float32)
 # What is seen through windows is exposed for itself, as photographers of interiors blend it in: how bright by day, the
-# power of the sky's light by which it is less in the evening, that by which its shadows are opened, and haze before it.
-THERE, DUSK, OPENED, VEIL = 1.9, 0.5, 0.85, 0.03
+# power of the sky's light by which it is less in the evening, and haze before it.
+THERE, DUSK, VEIL = 2.5, 0.5, 0.03
 WHITER = 0.15  # how much less coloured the light of lamps is than told: no wall is as yellow to eyes
 DIM = 0.004  # radiance at every place of a room without lamps and windows, so that one sees it
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
@@ -104,7 +104,7 @@ class Lights:
 
     def there(self, color: np.ndarray) -> np.ndarray:
         """(3, n) how a picture shows colours (3, n) of what lies around."""
-        return np.asarray((VEIL + (1 - VEIL) * color**OPENED) * (THERE * self.day**DUSK * self.tint)[:, None], "f4")
+        return np.asarray((VEIL + (1 - VEIL) * color) * (THERE * self.day**DUSK * self.tint)[:, None], "f4")
 
 
 def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
