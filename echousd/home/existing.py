@@ -5,13 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import shapely
 
 from echomodel.openings import Opening, direction, numbered
 from echousd.graph import SceneGraph
 from echousd.home.graph import HomeGraph, HomeRelation
 from echousd.home.openings import Floor, face_to_face, facings
-from echousd.home.plan import INNER, OUTER, HomePlan, overlapping, plan_home, rectangles, with_openings
+from echousd.home.plan import INNER, OUTER, HomePlan, overlapping, plan_home, with_openings
 from echousd.naming import STAGE_FORMS
 from echousd.shapes.walls import outline as offset
 
@@ -107,10 +106,7 @@ def walled(home: HomeGraph, rooms: Placed) -> HomePlan | None:
         floors = {name: offset(floor, -insets[name]).round(4) for name, floor in corners.items()}
     cells = {name: offset(floor, walls[name]).round(4) for name, floor in floors.items()}
     low = np.concatenate([*cells.values()]).min(0)
-    lie = {
-        name: tuple(rectangles(shapely.Polygon(cell - low)))[:2] if len(cell) in (4, 6) else ()
-        for name, cell in cells.items()
-    }
+    lie = {name: (*(cell - low).min(0), *(cell - low).max(0)) for name, cell in cells.items() if len(cell) == 4}
     poses = {name: pose for name, (_, pose) in rooms.items()}
     return HomePlan(home, cells, walls, {name: () for name in cells}, lie, poses)
 

@@ -170,7 +170,7 @@ def plan_home(home: HomeGraph, *, seed: int = 0, before: HomePlan | None = None)
     if faults:
         raise GraphError(faults[0])
     first = _problem(home, seed, before)
-    for effort, problem in itertools.product(EFFORTS, _attempts(home, first)):
+    for effort, problem in itertools.product(EFFORTS, _attempts(first)):
         state, lie = solved(problem, effort)
         if state == "solved":
             plan = _walled(home, lie)
@@ -362,19 +362,14 @@ def rectangles(shape: shapely.Geometry) -> Iterator[tuple[float, float, float, f
                     yield x, z, after, next_z
 
 
-def _attempts(home: HomeGraph, first: Problem) -> Iterator[Problem]:
-    """The problem, and then ever milder ones: wet rooms apart, freer areas, an L among the rooms, a notched outline."""
+def _attempts(first: Problem) -> Iterator[Problem]:
+    """The problem, and then ever milder ones: wet rooms apart, freer areas, a notched outline."""
     yield first
     apart = replace(first, together=())
     if first.together:
         yield apart
     loose = replace(apart, wishes=tuple(_loosened(wish) for wish in first.wishes))
     yield loose
-    degree = dict(networkx.Graph(relation.pair for relation in home.relations if relation.row.wall).degree)
-    served = sorted(first.wishes, key=lambda wish: (-(degree.get(wish.name, 0)), -wish.area))
-    for wish in served[:3]:
-        if wish.area > 6.0:
-            yield replace(loose, wishes=tuple(replace(w, parts=2) if w.name == wish.name else w for w in loose.wishes))
     if first.free:
         wide = (1.15 * first.extents[0], 1.15 * first.extents[1])
         yield replace(loose, extents=wide, gaps=True)
@@ -410,7 +405,7 @@ def _unplannable(problem: Problem) -> str:
 
 def _walled(home: HomeGraph, lie: Cells) -> HomePlan:
     """Floors between walls of real thickness, without openings, about the middle of the home."""
-    shapes = {name: shapely.union_all([shapely.box(*rect) for rect in own]) for name, own in lie.items()}
+    shapes = {name: shapely.box(*rect) for name, rect in lie.items()}
     whole = shapely.union_all([*shapes.values()])
     low, high = np.array(whole.bounds).reshape(2, 2)
     shift = -((low + high) / 2).round(2) if home.outline is None else np.array(home.outline).min(0)

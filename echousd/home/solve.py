@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, product
+from itertools import combinations
 from typing import Any
 
 import networkx
@@ -15,11 +15,10 @@ from echousd.home.graph import HomeRelation
 Rect = tuple[float, float, float, float]  # low x, low z, high x, high z, metres
 Way = list[tuple[Any, bool]]  # terms that must not be negative, or (True) that must be nothing
 Least = Callable[[float, int], float]
-Cells = dict[str, tuple[Rect, ...]]  # of every room the parts of its cell: floor and half of its walls
+Cells = dict[str, Rect]  # of every room: floor and half of its walls
 
 FACADE = 1.4  # metres of outer wall that a window needs
 CORNERS = 0.35  # metres of a shared wall that corners and casings take
-ELL = 1.4  # metres of either arm of an L
 MORE = 0.4  # square metres that a larger room has more, at least
 GAP = 0.1  # metres between rooms that share no wall, at least
 FINE = 0.05  # metres that wall lines are moved by
@@ -36,7 +35,7 @@ class Wish:
         area: square metres of its cell. least, most: what it may be as a share of that.
         ratio: long over short side at most.
         short: metres that its short side has at least.
-        outer: metres of outer wall that it wants. parts: rectangles, two of an L.
+        outer: metres of outer wall that it wants.
     """
 
     name: str
@@ -46,7 +45,6 @@ class Wish:
     ratio: float
     short: float
     outer: float = 0.0
-    parts: int = 1
 
 
 @dataclass(frozen=True)
@@ -68,7 +66,7 @@ class Problem:
     gaps: bool = False
     together: tuple[str, ...] = ()
     seed: int = 0
-    before: Mapping[str, Sequence[Rect]] | None = None
+    before: Mapping[str, Rect] | None = None
 
     @property
     def steps(self) -> np.ndarray:
@@ -81,7 +79,7 @@ class Problem:
 def solved(problem: Problem, effort: float = EFFORTS[-1]) -> tuple[str, Cells]:
     """`solved`, `impossible` (proven) or `unknown` (not within that effort), and the cells."""
     cp = extra("ortools.sat.python.cp_model", "plans need a constraint solver", "home", GraphError)
-    model, parts = _model(cp, problem)
+    model, sides = _model(cp, problem)
     solver = cp.CpSolver()
     solver.parameters.num_workers = 1
     solver.parameters.random_seed = problem.seed
@@ -91,10 +89,7 @@ def solved(problem: Problem, effort: float = EFFORTS[-1]) -> tuple[str, Cells]:
     if status not in (cp.OPTIMAL, cp.FEASIBLE):
         return ("impossible" if status == cp.INFEASIBLE else "unknown"), {}
     steps = np.tile(problem.steps, 2)
-    lie: Cells = {
-        name: tuple(tuple((np.array([solver.Value(v) for v in part]) * steps).tolist()) for part in own)
-        for name, own in parts.items()
-    }
+    lie: Cells = {name: tuple((np.array([*map(solver.Value, own)]) * steps).tolist()) for name, own in sides.items()}
     return "solved", _tuned(problem, lie)
 
 
@@ -103,18 +98,18 @@ def scaled(problem: Problem, lie: Cells, factor: float) -> Cells:
     side = float(np.sqrt(factor))
     wishes = tuple(replace(wish, area=wish.area * factor) for wish in problem.wishes)
     larger = replace(problem, wishes=wishes, extents=(problem.extents[0] * side, problem.extents[1] * side))
-    grown: Cells = {name: tuple((side * a, side * b, side * c, side * d) for a, b, c, d in lie[name]) for name in lie}
+    grown: Cells = {name: (side * a, side * b, side * c, side * d) for name, (a, b, c, d) in lie.items()}
     return _tuned(larger, grown, grid=False)
 
 
-def _model(cp: Any, problem: Problem) -> tuple[Any, dict[str, list[tuple[Any, Any, Any, Any]]]]:
-    """The constraints, and (low x, low z, high x, high z) of every part of every cell, in steps."""
+def _model(cp: Any, problem: Problem) -> tuple[Any, dict[str, tuple[Any, Any, Any, Any]]]:
+    """The constraints, and (low x, low z, high x, high z) of every cell, in steps."""
     model, steps = cp.CpModel(), problem.steps
     limits = [round(side / step) for side, step in zip(problem.extents, steps, strict=True)]
     cell = float(steps.prod())
-    parts: dict[str, list[tuple[Any, Any, Any, Any]]] = {}
+    rects: dict[str, tuple[Any, Any, Any, Any]] = {}
     spans: tuple[list[Any], list[Any]] = ([], [])
-    covered = []
+    sizes: dict[str, Any] = {}
 
     def least(metres: float, axis: int) -> int:
         return int(np.ceil(metres / steps[axis] - 1e-6))
@@ -135,28 +130,24 @@ def _model(cp: Any, problem: Problem) -> tuple[Any, dict[str, list[tuple[Any, An
         return area
 
     for wish in problem.wishes:
-        made = [rectangle(ELL if wish.parts > 1 else wish.short) for _ in range(wish.parts)]
-        parts[wish.name] = [part for part, _, _ in made]
-        areas = [area_of(w, h) for _, w, h in made]
-        covered += areas
+        rects[wish.name], w, h = rectangle(wish.short)
+        sizes[wish.name] = area_of(w, h)
         low, high = (round(wish.area * share / cell) for share in (wish.least, wish.most))
-        model.AddLinearConstraint(sum(areas), low, high)
-        if wish.parts == 1:
-            _, w, h = made[0]
-            across, deep = (round(1000 * step) for step in steps)
-            model.Add(across * 10 * w <= int(wish.ratio * 10) * deep * h)
-            model.Add(deep * 10 * h <= int(wish.ratio * 10) * across * w)
-        if problem.before and len(problem.before.get(wish.name, ())) == wish.parts:
-            for part, rect in zip(parts[wish.name], problem.before[wish.name], strict=True):
-                for variable, at, step in zip(part, rect, (*steps, *steps), strict=True):
-                    model.AddHint(variable, round(at / step))
+        model.AddLinearConstraint(sizes[wish.name], low, high)
+        across, deep = (round(1000 * step) for step in steps)
+        model.Add(across * 10 * w <= int(wish.ratio * 10) * deep * h)
+        model.Add(deep * 10 * h <= int(wish.ratio * 10) * across * w)
+        if problem.before and wish.name in problem.before:
+            hints = zip(rects[wish.name], problem.before[wish.name], (*steps, *steps), strict=True)
+            for variable, at, step in hints:
+                model.AddHint(variable, round(at / step))
     voids = [[round(at / step) for at, step in zip(void, (*steps, *steps), strict=True)] for void in problem.voids]
     for low_x, low_z, high_x, high_z in voids:
         spans[0].append(model.NewFixedSizeIntervalVar(low_x, high_x - low_x, ""))
         spans[1].append(model.NewFixedSizeIntervalVar(low_z, high_z - low_z, ""))
     model.AddNoOverlap2D(*spans)
     if not problem.gaps:
-        model.Add(sum(covered) == limits[0] * limits[1] - sum((v[2] - v[0]) * (v[3] - v[1]) for v in voids))
+        model.Add(sum(sizes.values()) == limits[0] * limits[1] - sum((v[2] - v[0]) * (v[3] - v[1]) for v in voids))
 
     def held(ways: Sequence[Way]) -> None:
         """Have one of some ways be kept."""
@@ -169,17 +160,15 @@ def _model(cp: Any, problem: Problem) -> tuple[Any, dict[str, list[tuple[Any, An
         if literals:
             model.AddBoolOr(literals)
 
-    each = iter(covered)
-    sizes = {wish.name: sum(next(each) for _ in range(wish.parts)) for wish in problem.wishes}
-    for ways in _demands(problem, parts, sizes, least, max(int(0.5 / cell), 1)):
+    for ways in _demands(problem, rects, sizes, least, max(int(0.5 / cell), 1)):
         held(ways)
     for wish in problem.wishes:
         if wish.outer:
-            own = parts[wish.name]
-            ends = [(part[axis + 2 * far], limits[axis] * far) for part in own for axis in (0, 1) for far in (0, 1)]
-            met = [way for part in own for void in voids for way in _touching(part, void, wish.outer, least)]
+            own = rects[wish.name]
+            ends = [(own[axis + 2 * far], limits[axis] * far) for axis in (0, 1) for far in (0, 1)]
+            met = [way for void in voids for way in _touching(own, void, wish.outer, least)]
             held([*([(end - border, True)] for end, border in ends), *met])
-    return model, parts
+    return model, rects
 
 
 def _touching(one: Sequence[Any], other: Sequence[Any], metres: float, least: Least) -> Iterator[Way]:
@@ -191,46 +180,31 @@ def _touching(one: Sequence[Any], other: Sequence[Any], metres: float, least: Le
             yield [(a[2 + axis] - b[axis], True), *wide]
 
 
-def _ells(one: Sequence[Any], other: Sequence[Any], least: Least) -> Iterator[Way]:
-    """The second rectangle stands flush at a corner of the first, on one of its four sides."""
-    for axis in (0, 1):
-        across = 1 - axis
-        longer = one[2 + across] - one[across] - (other[2 + across] - other[across]) - least(ELL, across)
-        for a, b in ((one, other), (other, one)):
-            for flush in (across, 2 + across):
-                yield [(a[2 + axis] - b[axis], True), (one[flush] - other[flush], True), (longer, False)]
-
-
 def _demands(
-    problem: Problem, parts: Mapping[str, Sequence[Any]], sizes: Mapping[str, Any], least: Least, more: float
+    problem: Problem, rects: Mapping[str, Sequence[Any]], sizes: Mapping[str, Any], least: Least, more: float
 ) -> Iterator[Sequence[Way]]:
     """What must hold between rectangles: each is kept in one of several ways, of numbers or of a solver's variables.
 
     Arguments:
-        parts: (low x, low z, high x, high z) of all parts of every room. sizes: their areas.
-        least: lengths along an axis, in the unit of the parts. more: area that a larger room has more.
+        rects: (low x, low z, high x, high z) of every room. sizes: their areas.
+        least: lengths along an axis, in the unit of the rectangles. more: area that a larger room has more.
     """
-    for wish in problem.wishes:
-        if wish.parts > 1:
-            yield [*_ells(parts[wish.name][0], parts[wish.name][1], least)]
     for relation in problem.relations:
-        row, pairs = relation.row, [*product(*(parts[name] for name in relation.pair))]
+        row, (a, b) = relation.row, (rects[name] for name in relation.pair)
         if row.wall:
-            yield [way for a, b in pairs for way in _touching(a, b, row.wall + CORNERS, least)]
+            yield [*_touching(a, b, row.wall + CORNERS, least)]
         elif any(row.step):
             axis, on = (0 if row.step[0] else 1), sum(row.step) > 0
-            for a, b in pairs:
-                twice, edge = a[axis] + a[2 + axis], 2 * b[2 + axis if on else axis]
-                yield [[(twice - edge if on else edge - twice, False)]]
+            twice, edge = a[axis] + a[2 + axis], 2 * b[2 + axis if on else axis]
+            yield [[(twice - edge if on else edge - twice, False)]]
         elif row.symmetric:
-            for a, b in pairs:
-                orders = product((0, 1), ((a, b), (b, a)))
-                yield [[(after[axis] - before[2 + axis] - least(GAP, axis), False)] for axis, (before, after) in orders]
+            orders = [(axis, pair) for axis in (0, 1) for pair in ((a, b), (b, a))]
+            yield [[(after[axis] - before[2 + axis] - least(GAP, axis), False)] for axis, (before, after) in orders]
         if row.compares:
             yield [[(sizes[relation.subject] - sizes[relation.object] - more, False)]]
     for name in problem.together if len(problem.together) > 1 else ():
-        near = [(a, b) for other in problem.together if other != name for a in parts[name] for b in parts[other]]
-        yield [way for a, b in near for way in _touching(a, b, 1.0, least)]
+        near = [rects[other] for other in problem.together if other != name]
+        yield [way for other in near for way in _touching(rects[name], other, 1.0, least)]
 
 
 def _tuned(problem: Problem, lie: Cells, *, grid: bool = True) -> Cells:
@@ -239,10 +213,9 @@ def _tuned(problem: Problem, lie: Cells, *, grid: bool = True) -> Cells:
     Arguments:
         grid: whether they lie on the solver's grid, on which their outline was rounded.
     """
-    rects = np.array([rect for own in lie.values() for rect in own])
+    rects = np.array([*lie.values()])
     line, at, pinned = _lines(problem, rects, grid=grid)
-    owner = np.repeat(np.arange(len(lie)), [len(own) for own in lie.values()])
-    cost, solved_at = _cost(problem, line, owner, rects), at
+    cost, solved_at = _cost(problem, line, rects), at
     at = np.where(pinned, at, (at / FINE).round() * FINE)
     best = cost(at)
     for move in (8 * FINE, 4 * FINE, 2 * FINE, FINE):
@@ -259,8 +232,7 @@ def _tuned(problem: Problem, lie: Cells, *, grid: bool = True) -> Cells:
             if best > before - 1e-9:
                 break
     at = at if best < cost(solved_at) else solved_at
-    placed = iter(at[line].round(4).tolist())
-    return {name: tuple(tuple(next(placed)) for _ in own) for name, own in lie.items()}
+    return dict(zip(lie, map(tuple, at[line].round(4).tolist()), strict=True))
 
 
 def _lines(problem: Problem, rects: np.ndarray, *, grid: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -287,13 +259,10 @@ def _lines(problem: Problem, rects: np.ndarray, *, grid: bool) -> tuple[np.ndarr
     return line[: len(rects)], np.array(at), np.array(pinned)
 
 
-def _cost(problem: Problem, line: np.ndarray, owner: np.ndarray, rects: np.ndarray) -> Callable[[np.ndarray], float]:
+def _cost(problem: Problem, line: np.ndarray, rects: np.ndarray) -> Callable[[np.ndarray], float]:
     """How far lines at some places are from what is asked; what the solver has seen to costs thousands if it breaks."""
     wishes = problem.wishes
-    target, least, most = np.array([(w.area, w.least, w.most) for w in wishes]).T
-    ratio = np.array([w.ratio for w in wishes])
-    single = np.array([w.parts == 1 for w in wishes])[owner]
-    short = np.array([w.short if w.parts == 1 else ELL for w in wishes])[owner]
+    target, least, most, ratio, short = np.array([(w.area, w.least, w.most, w.ratio, w.short) for w in wishes]).T
     low, high = rects[:, :2], rects[:, 2:]
     divided = [  # pairs of rectangles, and the axis along which one ends before the other begins
         (i, j, axis)
@@ -307,18 +276,18 @@ def _cost(problem: Problem, line: np.ndarray, owner: np.ndarray, rects: np.ndarr
     def cost(at: np.ndarray) -> float:
         here = at[line]
         sides = here[:, 2:] - here[:, :2]
-        areas = np.bincount(owner, sides.prod(1), minlength=len(wishes))
+        areas = sides.prod(1)
         share = areas / target
         shape = np.maximum(sides.max(1) / np.maximum(sides.min(1), 0.1), 1.0)
         wrong = np.maximum(short[:, None] - sides, 0).sum()
-        wrong += np.maximum(shape - ratio[owner], 0)[single].sum()
+        wrong += np.maximum(shape - ratio, 0).sum()
         wrong += np.maximum(least - share, 0).sum() + np.maximum(share - most, 0).sum()
         wrong += np.maximum(here[first, 2 + along] - here[second, along], 0).sum()
-        rows = iter(here.tolist())
-        parts = {wish.name: [next(rows) for _ in range(wish.parts)] for wish in wishes}
-        for ways in _demands(problem, parts, dict(zip(parts, areas.tolist(), strict=True)), lambda m, _: m, MORE):
+        names = [wish.name for wish in wishes]
+        own, sizes = (dict(zip(names, rows.tolist(), strict=True)) for rows in (here, areas))
+        for ways in _demands(problem, own, sizes, lambda m, _: m, MORE):
             wrong += min(sum(abs(term) if exact else max(-term, 0.0) for term, exact in way) for way in ways)
-        tidy = 0.02 * np.maximum(shape - 1.5, 0)[single].sum()
+        tidy = 0.02 * np.maximum(shape - 1.5, 0).sum()
         return float((np.square(share - 1) / np.maximum(1 - least, 0.05)).sum() + tidy + 1e4 * wrong)
 
     return cost
