@@ -24,7 +24,8 @@ def in_ascii(word: str) -> str:
 
 def as_identifier(word: str) -> str:
     """A word, such as the name of a file or folder, as a USD identifier."""
-    name = "".join(c if c.isalnum() else "_" for c in in_ascii(word)) or "room"
+    name = "".join(c if c.isalnum() else "_" for c in in_ascii(word))
+    name = name if name.strip("_") else "room"
     return name if not name[0].isdigit() else f"_{name}"
 
 

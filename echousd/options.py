@@ -17,7 +17,6 @@ from echomodel.late import Late
 from echousd.assets import STRETCH
 from echousd.graph.fields import RESIDENTS, SHAPES
 from echousd.graph.nodes import PlainModel
-from echousd.graph.values import IDENTIFIER
 from echousd.shapes import FACES
 
 validation_message = Late("echousd.invalid:validation_message")
@@ -87,8 +86,9 @@ class Look(BaseModel, frozen=True, strict=True, allow_inf_nan=False):
     )
     meters_per_unit: float = row(1.0, FILES, "unit of the files, in assets too", ge=1e-6, le=1e6)
     room_path: str = row(
-        "/Room", FILES, "prim path of the room", words="path", pattern=f"^(/{IDENTIFIER.pattern})+$", max_length=200
-    )
+        "/Room", FILES, "prim path of the room", words="path", max_length=200,
+        pattern=r"^(/[\p{XID_Start}_]\p{XID_Continue}*)+$",  # letters of any script
+    )  # fmt: skip
     faces: int = row(FACES, FILES, "face budget of each mesh", ge=100)
     atlas: bool = row(False, FILES, "unwrap without overlaps, not along the axes (extra: texture)")
     materialx: bool = row(False, FILES, "materials have a MaterialX network beside UsdPreviewSurface")

@@ -51,6 +51,7 @@ DOORS = {
     "echousd.graph.files": {"echousd.stage.graphs", "echousd.stage.read"},  # graphs in files that are stages
     "echousd.graph.scene": {"echousd.graph.difference", "echousd.graph.text"},  # methods of a graph
     "echousd.place.search": {"echousd.place.building"},
+    "echousd.stage.files": {"echousd.folder.found"},  # a room's folder stands for its root layer
     "echousd.stage.read": {"echousd.stage.foreign"},  # stages without a graph
 }
 

@@ -251,7 +251,7 @@ def check(
     """Check every room on a stage, in all of its layouts.
 
     Arguments:
-        stage: an open stage or a file.
+        stage: an open stage, a file or a room's folder.
         rules: `strict` or `sgfront`, for the relations.
         layout: number of the only layout to check.
         settle: simulate two seconds of every layout as well, in which everything must rest.

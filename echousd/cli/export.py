@@ -24,11 +24,10 @@ def export(
     Those that ignore purposes draw its colliders: --no-physics.
     """
     from echousd.exporting.formats import export as write
-    from echousd.folder.found import room_at
 
     path = write(
-        room_at(room), output, reader=reader, arkit=arkit, force=force, search=search or (), layout=layout,
-        physics=physics, pictures=pictures,
+        room, output, reader=reader, arkit=arkit, force=force, search=search or (), layout=layout, physics=physics,
+        pictures=pictures,
     )  # fmt: skip
     say_done(json, [path], [str(path)])
 
@@ -47,10 +46,8 @@ def render(
     from echousd.draw.from_files import render_cameras, render_turn
     from echousd.draw.pictures import gif, png
     from echousd.draw.rendering import QUALITIES, VIEWS
-    from echousd.folder.found import room_at
     from echousd.stage.files import write_all
 
-    room = room_at(room)
     if quality not in QUALITIES:
         raise ValueError(f"--quality is {quality!r}, allowed: {', '.join(QUALITIES)}")
     usual, rays = QUALITIES[quality]

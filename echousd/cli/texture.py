@@ -24,10 +24,8 @@ def export(
     layout: Layout = None, shell: bool | None = None, force: bool = False, json: AsJson = False,
 ) -> None:  # fmt: skip
     """Write meshes with texture coordinates, cameras, prompts, a script to run the tool, and job.json."""
-    from echousd.folder.found import room_at
     from echousd.texturing import export_texture_job
 
-    room = room_at(room)
     job = export_texture_job(
         room, output, tool, prompt=prompt, dressing=dressing, resolution=resolution, layout=layout, shell=shell,
         force=force,
@@ -45,10 +43,8 @@ def import_(
     wait: Wait = False, json: AsJson = False,
 ) -> None:  # fmt: skip
     """Bring what a tool painted back as a layer of your own over the room, and a variant of `looks`."""
-    from echousd.folder.found import room_at
     from echousd.texturing import import_texture_job
 
-    room = room_at(room)
     look = import_texture_job(room, job, name=name, skip=tuple(skip or ()), preview=preview, force=force, wait=wait)
     lines = [
         f"look     {look.layer}",

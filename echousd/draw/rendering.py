@@ -17,8 +17,7 @@ EVERY, CONTACT = "every-camera", "sheet"
 HERO, DOLLHOUSE = "hero", "dollhouse"
 VIEWS = (HERO, DOLLHOUSE, "top", EVERY, CONTACT)
 COLORS = ("materials", "class")
-SHEET = (HERO, "top")  # beside the best corner in the first row; below, the views from the others
-LARGEST = 4096
+LARGEST, GREY = 4096, 0.905  # pixels; beside a picture that is wider than high
 corner_views, top_view = (Late(f"echousd.draw.outside:{name}") for name in ("corner_views", "top_view"))
 QUALITIES = {"fast": (640, QUICK), "fine": (1280, FINE)}  # pixels across, rays along each side of a pixel
 
@@ -33,7 +32,7 @@ def render_stage(
         view: `hero` (8:5, from inside, with a ceiling, lit by windows and lamps; of a stage without walls as
             `dollhouse`), `dollhouse` (from above a corner, without the walls before it), `top` (orthographic, the
             front, +X of a Y-up stage, is up), `every-camera` (through every camera of the stage, in the order of their
-            paths), or `sheet` (dollhouse, hero, top; below from the other corners).
+            paths), or `sheet` (dollhouse, hero, top in a row; below from the other corners).
         size: pixels across, 16 to 4096.
         colors: `materials`, or `class` for one flat colour per category.
         rays: along each side of a pixel.
@@ -50,20 +49,27 @@ def render_stage(
     if view != CONTACT:
         return as_image(_seen(stage, scenery, view, size, rays))
     corner, *others = (trace(shown, camera, size, rays=rays) for camera, shown in corner_views(scenery))
-    first = [corner, *(_seen(stage, scenery, word, size, rays, square=True) for word in SHEET)]
+    inside = _inside(stage, scenery, size, rays)
+    bars = ((size - len(inside)) // 2, (size - len(inside) + 1) // 2), (0, 0), (0, 0)
+    first = [corner, np.pad(inside, bars, constant_values=GREY), _seen(stage, scenery, "top", size, rays)]
     return as_image(np.concatenate([np.concatenate(row, axis=1) for row in (first, others)]))
 
 
-def _seen(stage: Usd.Stage, scenery: Scenery, view: str, size: int, rays: int, *, square: bool = False) -> np.ndarray:
+def _seen(stage: Usd.Stage, scenery: Scenery, view: str, size: int, rays: int) -> np.ndarray:
     """(height, size, 3) what one of the views `hero`, `dollhouse` and `top` shows."""
     if view == "top":
         camera = top_view(scenery)
-    elif view == HERO and (scenery.closed or square):
-        camera = hero_view(stage, scenery)
-        scenery = with_ceiling(scenery) if scenery.closed else scenery
+    elif view == HERO and scenery.closed:
+        return _inside(stage, scenery, size, rays)
     else:
         camera, scenery = next(corner_views(scenery))
-    return trace(scenery, replace(camera, aspect=1.0) if square else camera, size, rays=rays)
+    return trace(scenery, camera, size, rays=rays)
+
+
+def _inside(stage: Usd.Stage, scenery: Scenery, size: int, rays: int) -> np.ndarray:
+    """(height, size, 3) what the view from inside shows, below a ceiling where there are walls all around."""
+    camera = hero_view(stage, scenery)
+    return trace(with_ceiling(scenery) if scenery.closed else scenery, camera, size, rays=rays)
 
 
 def cameras_of(stage: Usd.Stage) -> dict[str, View]:

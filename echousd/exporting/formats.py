@@ -86,7 +86,7 @@ def export(
     """Write a room (any stage) as one file, or as the folder that one `reader` expects, and return what to open.
 
     Arguments:
-        room: root layer of the room.
+        room: root layer or folder of the room.
         out: `.usdz` (one flat usda inside, which web viewers read), `.glb`, or a flat `.usda` or `.usdc`; or a folder.
         reader: `sceneeval` (its sceneState, a glb for every object) or `habitat` (a data set of the room or home).
         arkit: usdz as Apple's viewers want it: one usdc inside, Y up, without lights and scene graph.

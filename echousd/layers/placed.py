@@ -72,9 +72,10 @@ def _place(layer: Sdf.Layer, name: str, original: Original, path: str) -> None:
         root = layer.GetPrimAtPath(f"/{name}")
         places = Sdf.PrimSpec(root, piece_name(name, PLACES), Sdf.SpecifierDef, "Xform")
         matrix = Gf.Matrix4d(*(round(float(v), 9) + 0.0 for v in np.asarray(original.pose).T.ravel()))
+        places.kind = Kind.Tokens.subcomponent
         say(places, ops(transform=("matrix4d", matrix)))
         model = Sdf.PrimSpec(places, piece_name(name, MODEL), Sdf.SpecifierDef)
-        model.kind = Kind.Tokens.subcomponent  # a component has none below it
+        model.kind = ""  # a component has none below it, nor has a subcomponent
         model.payloadList.prependedItems.append(Sdf.Payload(path, Sdf.Path(original.prim)))
 
 

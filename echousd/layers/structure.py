@@ -178,7 +178,8 @@ def shell_layer(built: Sequence[ShellPrim], data: Mapping[str, Any], openings: S
 def _prims(part: ShellPart, above: str, kind: str, forms: Iterator[Surface]) -> Iterator[ShellPrim]:
     path = f"{above}/{part.name}"
     meshes = tuple(ShellMesh(f"{path}/{piece.name}", piece.look, next(forms), piece.solid) for piece in part.pieces)
-    inner = [list(_prims(each, path, Kind.Tokens.subcomponent, forms)) for each in part.inner]
+    within = Kind.Tokens.subcomponent if kind == Kind.Tokens.component else ""  # none below a subcomponent
+    inner = [list(_prims(each, path, within, forms)) for each in part.inner]
     extents = np.stack([mesh.form.extent for mesh in meshes] + [prims[0].extent + prims[0].at for prims in inner])
     extent = np.stack([extents[:, 0].min(0), extents[:, 1].max(0)])
     mass = _mass([piece for piece in part.pieces if piece.solid], np.array(part.joint.anchor)) if part.joint else None

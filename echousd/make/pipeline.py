@@ -36,6 +36,7 @@ with_earlier_locks, with_locked_places, with_locked_shapes = lates(
     "echousd.make.reading", "with_earlier_locks", "with_locked_places", "with_locked_shapes"
 )
 with_space, wishes_of = Late("echousd.make.fitting:with_space"), Late("echousd.assets.choose:wishes_of")
+room_at = Late("echousd.folder.found:room_at")
 
 
 @takes_options()
@@ -51,7 +52,7 @@ def generate(
     placed where no furniture stands; both are in the room's graph and stay when it is generated again.
 
     Arguments:
-        graph: the graph, or a file that holds one (stage, YAML, JSON).
+        graph: the graph, a file that holds one (stage, YAML, JSON), or a room's folder.
         room: prim path of one room where the file holds several.
         options: how the room is made and written; `changes`, the same by name, comes first. Equal options give equal
             rooms.
@@ -85,10 +86,11 @@ def generate(
 
         require_engine()
     if not isinstance(graph, SceneGraph):
-        file, beside = Path(graph).name, Path(graph).parent
-        read = None if room else Path(graph)
+        path = room_at(Path(graph)) if Path(graph).is_dir() else Path(graph)
+        file, beside = path.name, path.parent
+        read = None if room else path
         with timer.stage("read"):
-            graph, other = _read(Path(graph), room, asked)
+            graph, other = _read(path, room, asked)
     before = earlier if earlier is None or earlier.is_dir() else earlier.parent
     if any(node.locked for node in graph.nodes) or (before and any(before.glob("*.json"))):
         graph, held = with_earlier_locks(graph, earlier)

@@ -11,10 +11,13 @@ from tempfile import NamedTemporaryFile, gettempdir
 from pxr import Ar, Sdf, Tf, Usd, UsdUtils
 
 from echomodel.files import raising, whole_file
+from echomodel.late import Late
 from echousd.naming import STAGE_FORMS
 from echousd.pending import check_written
 from echousd.stage.encoding import StageError
 from echousd.stage.harmless import check_harmless
+
+room_at = Late("echousd.folder.found:room_at")
 
 MEMORY = "/dev/shm"  # where Linux keeps files in memory
 # a MaterialX document, not there or no plugin
@@ -22,19 +25,18 @@ MATERIALS = re.compile(r"Could not open asset @([^@]*\.mtlx)@", re.IGNORECASE)
 
 
 def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
-    """The stage in the file at `path`.
+    """The stage in the file at `path`, or of the one room in a folder.
 
-    Raises StageError for a file that is missing, not USD or does not compose, and ValueError for a room that is
-    half-written.
+    Raises StageError for a file that is missing, not USD or does not compose, and ValueError for a folder without a
+    room or with several, and for a room that is half-written.
     """
     path = Path(path)
-    check_written([path])
     with raising(f"{path}: cannot be opened", OSError, ValueError, kind=StageError):
-        there = path.exists()
+        there, folder = path.exists(), path.is_dir()
+    path = Path(room_at(path)) if folder else path
+    check_written([path])
     if not there:
         raise StageError(f"{path}: no such file")
-    if path.is_dir():
-        raise StageError(f"{path}: a folder, allowed: a file, {', '.join(STAGE_FORMS)}")
     if not path.is_file():
         raise StageError(f"{path}: not a regular file, allowed: a file, {', '.join(STAGE_FORMS)}")
     check_path(path)

@@ -13,6 +13,7 @@ from echomodel.files import check_free
 from echousd.draw.surfaces import Painted, Surfaces, read_surfaces
 from echousd.folder import folder as folders
 from echousd.folder import ownership
+from echousd.folder.found import room_at
 from echousd.folder.manifest import find_manifest
 from echousd.folder.merging import loses_text
 from echousd.graph.values import IDENTIFIER
@@ -63,7 +64,7 @@ def import_texture_job(
     texture coordinates `st_<name>`; the variant set `looks` on the room has `made` (as it was) and `<name>`.
 
     Arguments:
-        room: root layer of the room that the job was made of. job: the job's folder.
+        room: root layer or folder of the room that the job was made of. job: the job's folder.
         name: of the look, "" = the tool's.
         skip: names of objects that keep their look.
         preview: draw the room's picture anew.
@@ -73,7 +74,7 @@ def import_texture_job(
     Raises ValueError, nothing written, for results that are missing or cannot be used, for a name that is taken, and
     for objects that are not what they were when the job was made, by their names.
     """
-    room, folder = Path(room), Path(job)
+    room, folder = room_at(Path(room)), Path(job)
     if room.suffix not in LAYER_FORMS:
         raise ValueError(f"{room}: allowed: a room's root layer, {', '.join(LAYER_FORMS)}")
     task = read_job(folder)

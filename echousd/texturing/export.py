@@ -38,7 +38,7 @@ def export_texture_job(
     """Write a room as a job for a texturing tool: meshes with texture coordinates, cameras, prompts and `job.json`.
 
     Arguments:
-        room: root layer of a room.
+        room: root layer or folder of a room.
         out: the job's folder.
         tool: `scenetex` (the whole room, one picture of 4096), `hunyuan`, `mvpainter` (object by object, with pictures
             of them) or `generic` (object by object).

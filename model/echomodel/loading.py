@@ -36,6 +36,8 @@ def load_model(weights: str | Path | None = None, *, device: str = "cpu") -> Roo
     """
     require_device(device)
     path = None if weights is None else Path(weights).absolute()
+    if path and not path.exists():
+        raise ValueError(f"{weights}: no such weights, allowed: a file or folder of `echousd train` or `convert`")
     return _loaded(path, _stamp(path), None if path is None and device == "cpu" else device)
 
 

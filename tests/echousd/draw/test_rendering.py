@@ -371,6 +371,15 @@ def test_a_sheet_shows_six_views(root):
     assert min(np.abs(a - b).mean() for a, b in combinations([sheet[:48, :48], *cells], 2)) > 0.01
 
 
+def test_a_sheet_holds_the_default_picture_of_a_room():
+    options = RoomOptions(walls=True, dress="none")
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, options=options)
+    stage = room.stage
+    sheet = pixels(render_stage(stage, view="sheet", size=48, rays=1))
+    np.testing.assert_array_equal(sheet[9:39, 48:96], pixels(render_stage(stage, size=48, rays=1)))
+    assert np.ptp(sheet[:9, 48:96], axis=(0, 1)).max() == 0  # a bar above, and one below
+
+
 def test_a_turn_goes_all_around(root):
     pictures = [pixels(picture) for picture in render_turn(root, frames=8, size=48, rays=1)]
     assert len(pictures) == 8

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from echomodel.boxes2d import upright
-from echomodel.dressing import usual
+from echomodel.dressing import KINDS, usual
 from echomodel.dressing.textiles import LEAN
 from echomodel.triangles import joined
 from echousd import generate
@@ -17,6 +17,15 @@ from echousd.dressing.soft_tops import STEP, Seat, heights_of, let_down
 from echousd.graph import SceneGraph
 from echousd.shapes.geometry import Collider, Geometry, Part
 from echousd.shapes.hulls import convex_hull, depth, forbidden_moves
+
+
+@pytest.mark.parametrize("kind", ["cushion", "lumbar_cushion", "pouf"])
+def test_soft_things_weigh_what_real_ones_do_whatever_covers_them(kind):
+    row, luck = KINDS[kind], np.random.default_rng(0)
+    sizes = [tuple(luck.uniform(row.low, row.high).tolist()) for _ in range(40)]
+    found = [geometry_of(kind, size, variant).mass.mass for variant, size in enumerate(sizes)]
+    low, high = (1.0, 9.0) if kind == "pouf" else (0.2, 1.3)
+    assert low < min(found) < max(found) < high
 
 
 def seat_of(*solids):

@@ -341,6 +341,7 @@ def their_stage(file, metres, axis, *paths):
         (0.01, "Y", "/Room", "meters_per_unit 0.01, the room 1.0"),
         (1.0, "Z", "/Room", "up_axis 'Z', the room 'Y'"),
         (1.0, "Y", "/World/Flat/Living", "room_path '/World/Flat/Living', the room '/Room'"),
+        (1.0, "Z", "/家/寝室", "up_axis 'Z', the room 'Y'; room_path '/家/寝室', the room '/Room'"),
     ],
 )
 def test_a_room_says_which_conventions_of_its_stage_it_does_not_keep(tmp_path, metres, axis, path, said):
@@ -361,11 +362,16 @@ def test_options_that_are_stated_are_not_those_of_the_other_stage(tmp_path):
     options = echousd.RoomOptions(like=their_stage(tmp_path / "a.usda", 0.01, "Z", "/World/Living"), room_path="/Flat")
     assert (options.meters_per_unit, options.up_axis, options.room_path, options.like) == (0.01, "Z", "/Flat", None)
     two = their_stage(tmp_path / "two.usda", 0.01, "Z", "/World/Living", "/World/Study")
+    theirs = their_stage(tmp_path / "ie.usda", 0.01, "Z", "/家/寝室")
+    assert echousd.RoomOptions(like=theirs).room_path == "/家/寝室"
     with pytest.raises(ValueError, match=r"two.usda: 2 rooms, name one \(room_path\): /World/Living, /World/Study"):
         echousd.RoomOptions(like=two)
     assert echousd.RoomOptions(like=two, room_path="/World/Study").meters_per_unit == 0.01
-    with pytest.raises(ValueError, match="room_path is 'World', allowed: a path of names of letters, digits and _"):
-        echousd.RoomOptions(room_path="World")
+    for word in ("World", "/World/", "//Room", "/a-b", "/2nd"):
+        with pytest.raises(
+            ValueError, match=f"room_path is '{word}', allowed: a path of names of letters, digits and _"
+        ):
+            echousd.RoomOptions(room_path=word)
 
 
 def test_lamps_that_are_told_to_be_near_something_low_hang_on_longer_cords():

@@ -120,7 +120,7 @@ def test_categories_without_a_class_are_named(tmp_path, echousd_command):
 @pytest.mark.parametrize(
     ("name", "text"),
     [
-        ("missing.safetensors", "not a readable safetensors file (No such file"),
+        ("missing.safetensors", "no such weights, allowed: a file or folder of `echousd train` or `convert`"),
         ("damaged.safetensors", "not a readable safetensors file"),
         ("folder", "holds no weights files (.safetensors)"),
     ],

@@ -342,7 +342,15 @@ def test_room_is_shown_in_notebooks():
 
 @pytest.mark.parametrize(
     ("word", "name"),
-    [("out", "out"), ("my room", "my_room"), ("7", "_7"), ("Küche", "Kueche"), ("ré☃", "re"), ("部屋", "room")],
+    [
+        ("out", "out"),
+        ("my room", "my_room"),
+        ("7", "_7"),
+        ("Küche", "Kueche"),
+        ("ré☃", "re"),
+        ("部屋", "room"),
+        ("Спальня Ани", "room"),
+    ],
 )
 def test_names_of_rooms_are_identifiers(word, name):
     assert as_identifier(word) == name

@@ -184,6 +184,21 @@ def test_a_scale_of_a_stronger_layer_is_said_for_boxes_do_not_follow(root):
         read_room(layer.realPath)
 
 
+@pytest.mark.parametrize("call", [
+    lambda room, out: echousd.check(room).layouts[0].relations,
+    lambda room, out: echousd.read_dressing(room),
+    lambda room, out: echousd.read_rooms(room),
+    lambda room, out: echousd.render(room, size=16, rays=1).tobytes(),
+    lambda room, out: echousd.export(room, out / "room.glb", force=True).read_bytes(),
+    lambda room, out: echousd.generate(room, shapes="boxes", dress="none", preview=False).graph,
+    lambda room, out: sorted(one.name for one in echousd.export_texture_job(room, out, "generic", force=True).objects),
+])  # fmt: skip
+def test_a_folder_stands_for_its_room(root, tmp_path, call):
+    assert call(root.parent, tmp_path / "out") == call(root, tmp_path / "out")
+    with pytest.raises(ValueError, match=r"layers: no room in this folder$"):
+        call(root.parent / "layers", tmp_path / "out")
+
+
 def test_an_object_that_was_written_by_hand_is_named_with_the_remedy(root):
     layer = Sdf.Layer.FindOrOpen(str(root.parent / "layers" / "graph.usda"))
     stage = Usd.Stage.Open(layer)

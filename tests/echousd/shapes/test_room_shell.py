@@ -142,6 +142,7 @@ def test_prims_of_the_shell(tmp_path) -> None:
     label = "semantics:labels:category"
     door = stage.GetPrimAtPath("/Room/Shell/Wall_3/Wall_3_door")
     assert Usd.ModelAPI(door).GetKind() == "subcomponent"
+    assert all(Usd.ModelAPI(part).GetKind() == "" for part in door.GetChildren())  # a subcomponent has none below it
     assert list(door.GetAttribute(label).Get()) == ["door"]
     assert list(stage.GetPrimAtPath("/Room/Shell/Wall_1/Wall_1_window").GetAttribute(label).Get()) == ["window"]
     assert all(Usd.ModelAPI(prim).GetKind() == "component" for prim in pieces)
