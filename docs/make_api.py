@@ -15,6 +15,7 @@ from echomodel.rules import rule_set
 from echomodel.rules.placements import RULES as PLACES
 from echousd.checks import CheckReport, Collision, Fault, Misplacement
 from echousd.checks.report import LayoutReport
+from echousd.graph.changes import EditRequest
 from echousd.graph.difference import GraphDiff
 from echousd.graph.nodes import PlainModel
 from echousd.home.assemble import Made
@@ -29,10 +30,11 @@ from echousd.settle.settle import Motion, SettleReport
 from echousd.shapes.finishes.slots import HARMONIES
 
 PAGE = Path(__file__).with_name("API.md")
-ORDER = ("SceneGraph", "generate", "Room", "RoomOptions", "edit", "check", "render", "export", "load_model",
-         "HomeGraph", "plan_home", "generate_home", "import_plan")  # fmt: skip
+ORDER = ("SceneGraph", "generate", "Room", "RoomOptions", "edit", "update", "adopt", "undo", "redo", "check", "render",
+         "export", "load_model", "HomeGraph", "plan_home", "generate_home", "import_plan")  # fmt: skip
 # what a name gives that has no public name of its own
 GIVES = {
+    "edit": (EditRequest,),
     "SceneGraph": (GraphDiff,),
     "Room": (LayoutOutcome, Verdict, Provenance),
     "HomeGraph": (HomeRoom, HomeRelation),
@@ -67,6 +69,13 @@ for number, name in enumerate(room.names):
     print(f"{name:>5} at x {x:+.2f}, height {height:.2f}, z {z:+.2f}")
 print(*room.verdicts, *room.faults, sep="\n")
 print(room.stage.GetDefaultPrim().GetPath(), room.save("out/study"))
+""",
+    "edit": r"""
+import echousd
+
+room = echousd.edit("out/study", add=["shelf:bookshelf"], relate=["shelf left of desk"], lock="desk", shapes="boxes")
+room.save("out/study")
+print(*echousd.undo("out/study"), sep="\n")  # as it was; echousd.redo makes it again
 """,
     "check": r"""
 import echousd

@@ -17,8 +17,12 @@ from echousd.home.graph import HomeGraph as HomeGraph
 from echousd.home.importing.formats import import_plan as import_plan
 from echousd.home.plan import plan_home as plan_home
 from echousd.make.edit import edit as edit
+from echousd.make.edit import redo as redo
+from echousd.make.edit import undo as undo
+from echousd.make.edit import update as update
 from echousd.make.finished import Room as Room
 from echousd.make.pipeline import generate as generate
+from echousd.make.wishes import adopt as adopt
 from echousd.options import RoomOptions as RoomOptions
 from echousd.stage.boxes import read_dressing as read_dressing
 from echousd.stage.boxes import relations_from_boxes as relations_from_boxes

@@ -23,8 +23,16 @@ if TYPE_CHECKING:
     from echousd.shapes.geometry import Geometry
 
 
+class Found:
+    """What is found of a room: a dataclass that reports and manifests hold."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Its fields, numbers with four digits."""
+        return {name: round(value, 4) if isinstance(value, float) else value for name, value in vars(self).items()}
+
+
 @dataclass(frozen=True)
-class Verdict:
+class Verdict(Found):
     """What became of one relation of the graph: `kept`, `broken` or `unmeasured`, and by how much (metres or ratio)."""
 
     subject: str
@@ -41,12 +49,6 @@ class Verdict:
     def sentence(self) -> str:
         """The relation or placement as a sentence."""
         return " ".join(filter(None, (self.subject, self.predicate, self.object)))
-
-    def to_json(self) -> dict[str, Any]:
-        """The entry of the manifest."""
-        margin = None if self.margin is None else round(self.margin, 4)
-        triple = {"subject": self.subject, "predicate": self.predicate, "object": self.object}
-        return {**triple, "state": self.state, "margin": margin}
 
 
 @dataclass(frozen=True)

@@ -181,10 +181,11 @@ def test_the_examples_on_the_page_of_the_api_run(tmp_path, monkeypatch, capsys):
     shown = [block for block in blocks(page.read_text("utf-8")) if block.language == "python"]
     for block in shown:
         exec(compile(block.text, f"{page.name}, block of line {block.line}", "exec"), {})
-    assert len(shown) == 4
+    assert len(shown) == 5
     printed = capsys.readouterr().out
     assert printed.startswith("+ object lamp (table_lamp)\n+ relation lamp standing_on desk\n")
     assert "/Room out/study/study.usda\n" in printed
+    assert "+ object shelf (bookshelf)\n" in printed  # which was taken back
 
 
 @pytest.mark.skipif(not README.exists(), reason="no README.md in this checkout")

@@ -74,10 +74,9 @@ def room(job: Job) -> dict[str, Any]:
 def generated(job: Job) -> Room:
     """The room of a job; raises ValueError as `generate` does."""
     if job.begin:
-        from echousd.folder.found import room_at
         from echousd.make.edit import edit
 
-        return edit(room_at(Path(job.folder)), SceneGraph.from_json(job.text), outside=job.outside)
+        return edit(job.folder, SceneGraph.from_json(job.text), outside=job.outside)
     from echousd.make.pipeline import generate
 
     if job.draw is not None and not job.text:

@@ -14,6 +14,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.checks.reading import Reading
 from echousd.graph.nodes import HEIGHT
 from echousd.place.geometry import SOLID, TOUCH, Collision, Floor, depth_inside, pair_indices, separation
+from echousd.room import Found
 from echousd.stage.contents import RoomContents, RoomObject, Shape, Surrounding, surroundings
 from echousd.stage.labels import known_category
 from echousd.stage.read import RoomPrims
@@ -33,7 +34,7 @@ LARGE, LITTLE = 4.0, 0.25  # how often as large as its kind a small thing may be
 
 
 @dataclass(frozen=True)
-class Misplacement:
+class Misplacement(Found):
     """An object in the wrong place, `distance` in metres.
 
     `problem` is `outside`, `floating`, `sunk`, `empty` (nothing of it is seen), `turned` (a screen that nobody can look
@@ -43,14 +44,6 @@ class Misplacement:
     object: str
     problem: str
     distance: float | None = None
-
-    def to_json(self) -> dict:
-        """The entry of the report."""
-        return {
-            "object": self.object,
-            "problem": self.problem,
-            "distance": None if self.distance is None else round(self.distance, 4),
-        }
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from echousd.graph.changes import EditRequest
 
 check_output, held, writing = (Late(f"echousd.folder.folder:{word}") for word in ("check_output", "held", "writing"))
+pictures = Late("echousd.folder.ownership:pictures")
 check_ours, own_root, room_at = (Late(f"echousd.folder.found:{word}") for word in ("check_ours", "own_root", "room_at"))
 read_room, write_pictures = Late("echousd.make.reading:read_room"), Late("echousd.make.save:write_pictures")
 progress_bar, StageTimer = Late("echousd.cli.progress:progress_bar"), Late("echomodel.progress:StageTimer")
@@ -54,13 +55,15 @@ def edit(
     room = room_at(room)
     check_ours(room)
     if alone:
-        _step(own_root(room), wait, json, "undo" if undo else "redo")
+        from echousd.make import edit as steps
+
+        done = (steps.undo if undo else steps.redo)(room, wait=wait)
+        _say_steps(own_root(room), "undone" if undo else "redone", done, json)
         return
-    changes["outside"] = (*(outside or ()), *(Path(text.partition(":")[2].strip()).parent for text in wishes.reshape))
-    nothing = "nothing to change; use --add, --remove, --relabel, --relate, --unrelate, --move and others (--help)"
+    changes["outside"] = (*(outside or ()), *wishes.folders)
     _change(
         f"edit {_name_of(wishes, changes)}", lambda: (room, wished(read_room(room), wishes)), output or room.parent,
-        changes, nothing, dry_run=dry_run, force=force, wait=wait, json=json,
+        changes, dry_run=dry_run, force=force, wait=wait, json=json,
     )  # fmt: skip
 
 
@@ -107,9 +110,8 @@ def update(
         return own, graph
 
     changes["outside"] = outside or ()
-    nothing = f"{layer}: changes nothing about the room"
     run = f"update {_name_of(layer.name, layer.read_bytes(), changes)}"
-    _change(run, wanted, layer.parent, changes, nothing, dry_run=dry_run, force=False, wait=wait, json=json)
+    _change(run, wanted, layer.parent, changes, dry_run=dry_run, force=False, wait=wait, json=json)
 
 
 def _name_of(*asked: object) -> str:
@@ -117,18 +119,6 @@ def _name_of(*asked: object) -> str:
     from echomodel.files import digest
 
     return digest(repr(asked).encode())
-
-
-def _step(room: Path, wait: bool, json: bool, run: str) -> None:
-    """Take the last edit of a room back (`undo`), or make it again (`redo`), and say what it was."""
-    from echousd.folder import history
-
-    step = {"undo": history.undo, "redo": history.redo}[run]
-    with held(room.parent, wait=wait, run=run) as finished:
-        shown = finished or room.with_suffix(".png").is_file()  # who wanted no picture gets none
-        steps = history.steps_of(room, run) if finished == run else step(room)
-        pictures = write_pictures(room) if shown else []
-    _say_steps(room, pictures, {"undo": "undone", "redo": "redone"}[run], steps, json)
 
 
 def _recover(room: Path, wait: bool, json: bool) -> None:
@@ -147,20 +137,22 @@ def _say_finished(room: Path, steps: Sequence[str], json: bool) -> None:
     """Draw a room whose run was finished, and say what it did; exit code 1 where it has faults."""
     from echousd.folder.manifest import find_manifest
 
-    _say_steps(room, write_pictures(room), "finished", steps, json)
+    write_pictures(room)
+    _say_steps(room, "finished", steps, json)
     layouts = (find_manifest(room.parent, room.stem) or {}).get("layouts", ())
     if any(layout["broken"] or layout["collisions"] or layout.get("restless") for layout in layouts):
         raise typer.Exit(1)
 
 
-def _say_steps(room: Path, pictures: Sequence[Path], word: str, steps: Sequence[str], json: bool) -> None:
+def _say_steps(room: Path, word: str, steps: Sequence[str], json: bool) -> None:
     lines = [*(f"{word:<8} {step}" for step in steps), f"room     {room}"]
-    say_done(json, [room, *pictures], lines, {word: list(steps)})
+    drawn = (room.parent / name for name in pictures(room.parent, room.stem))
+    say_done(json, [room, *drawn], lines, {word: list(steps)})
 
 
 def _change(
-    run: str, wanted: Callable[[], tuple[Path, SceneGraph]], folder: Path, options: dict[str, Any], nothing: str, *,
-    dry_run: bool, force: bool, wait: bool, json: bool,
+    run: str, wanted: Callable[[], tuple[Path, SceneGraph]], folder: Path, options: dict[str, Any], *, dry_run: bool,
+    force: bool, wait: bool, json: bool,
 ) -> None:  # fmt: skip
     """Have the room in a folder become what `wanted` says (its root layer and the graph), or say what would happen.
 
@@ -180,7 +172,7 @@ def _change(
         room = read_room(root)
         steps = room.graph.diff(graph).lines()
         if not steps:
-            raise ValueError(nothing)
+            raise ValueError("nothing to change; use --add, --remove, --relate, --unrelate, --move and others (--help)")
         if dry_run:
             fresh, moving = touched(room.graph, graph, room.boxes)
             moving |= carried(room.graph, graph, room.boxes)[1]
@@ -213,21 +205,19 @@ def adopt(
     check_output(output, flat=False, force=force)
     with writing(output, flat=False, force=force, wait=wait), telling_faults(), progress_bar() as listen:
         from echousd.make.finished import write_room
-        from echousd.make.pipeline import generate
-        from echousd.make.wishes import adopted, seen_in_theirs
-        from echousd.stage.apart import check_apart
+        from echousd.make.wishes import adopt as complete
+        from echousd.make.wishes import seen_in_theirs
 
-        check_apart(stage)
-        graph = adopted(stage, room=room, add=add, relate=relate or (), names=names)
-        made = generate(graph, options=options, outside=outside or (), progress=listen)
+        given: dict[str, Any] = {"options": options, "outside": outside or (), "progress": listen}
+        made = complete(stage, room=room, add=add, relate=relate or (), names=names, **given)
         written = write_room(made, output, StageTimer(listen), force=force)
-    kept = sum(node.asset is not None for node in graph.nodes)
+    kept = sum(node.asset is not None for node in made.graph.nodes)
     seen = seen_in_theirs(made)
     if not json:
-        say(f"adopted  {kept} objects of {stage.name}, {len(graph.nodes) - kept} new")
+        say(f"adopted  {kept} objects of {stage.name}, {len(made.graph.nodes) - kept} new")
         for one in seen:
             say(f"theirs   {one}")
-    more = {"adopted": kept, "new": len(graph.nodes) - kept, "theirs": seen}
+    more = {"adopted": kept, "new": len(made.graph.nodes) - kept, "theirs": seen}
     report([written], json=json, more=more)
 
 

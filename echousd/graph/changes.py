@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 
@@ -25,3 +26,8 @@ class EditRequest:
     resize: Sequence[str] = _ask("name:x,y,z", "Size at heading 0, metres.")
     reshape: Sequence[str] = _ask("name:file", "Model of your own in its place (USD, glTF, OBJ).")
     restyle: Sequence[str] = _ask("name:style", "Style, of the room as in room:industrial; without a style none.")
+
+    @property
+    def folders(self) -> tuple[Path, ...]:
+        """Where the models lie that it brings along."""
+        return tuple(Path(text.partition(":")[2].strip()).parent for text in self.reshape)

@@ -99,7 +99,7 @@ def scaled(problem: Problem, lie: Cells, factor: float) -> Cells:
     wishes = tuple(replace(wish, area=wish.area * factor) for wish in problem.wishes)
     larger = replace(problem, wishes=wishes, extents=(problem.extents[0] * side, problem.extents[1] * side))
     grown: Cells = {name: (side * a, side * b, side * c, side * d) for name, (a, b, c, d) in lie.items()}
-    return _tuned(larger, grown, grid=False)
+    return _tuned(larger, grown)
 
 
 def _model(cp: Any, problem: Problem) -> tuple[Any, dict[str, tuple[Any, Any, Any, Any]]]:
@@ -114,24 +114,17 @@ def _model(cp: Any, problem: Problem) -> tuple[Any, dict[str, tuple[Any, Any, An
     def least(metres: float, axis: int) -> int:
         return int(np.ceil(metres / steps[axis] - 1e-6))
 
-    def rectangle(short: float) -> tuple[tuple[Any, Any, Any, Any], Any, Any]:
-        ends, sides = [], []
+    for wish in problem.wishes:
+        along = []
         for axis in (0, 1):
             low, high = (model.NewIntVar(0, limits[axis], "") for _ in range(2))
-            side = model.NewIntVar(least(short, axis), limits[axis], "")
+            side = model.NewIntVar(least(wish.short, axis), limits[axis], "")
             spans[axis].append(model.NewIntervalVar(low, side, high, ""))
-            ends.append((low, high))
-            sides.append(side)
-        return (ends[0][0], ends[1][0], ends[0][1], ends[1][1]), sides[0], sides[1]
-
-    def area_of(w: Any, h: Any) -> Any:
-        area = model.NewIntVar(0, limits[0] * limits[1], "")
-        model.AddMultiplicationEquality(area, [w, h])
-        return area
-
-    for wish in problem.wishes:
-        rects[wish.name], w, h = rectangle(wish.short)
-        sizes[wish.name] = area_of(w, h)
+            along.append((low, high, side))
+        (west, east, w), (south, north, h) = along
+        rects[wish.name] = (west, south, east, north)
+        sizes[wish.name] = model.NewIntVar(0, limits[0] * limits[1], "")
+        model.AddMultiplicationEquality(sizes[wish.name], [w, h])
         low, high = (round(wish.area * share / cell) for share in (wish.least, wish.most))
         model.AddLinearConstraint(sizes[wish.name], low, high)
         across, deep = (round(1000 * step) for step in steps)
@@ -207,14 +200,10 @@ def _demands(
         yield [way for other in near for way in _touching(rects[name], other, 1.0, least)]
 
 
-def _tuned(problem: Problem, lie: Cells, *, grid: bool = True) -> Cells:
-    """The cells with their wall lines moved, on 5 cm, until areas and proportions are as near as they get.
-
-    Arguments:
-        grid: whether they lie on the solver's grid, on which their outline was rounded.
-    """
+def _tuned(problem: Problem, lie: Cells) -> Cells:
+    """The cells with their wall lines moved, on 5 cm, until areas and proportions are as near as they get."""
     rects = np.array([*lie.values()])
-    line, at, pinned = _lines(problem, rects, grid=grid)
+    line, at, pinned = _lines(problem, rects)
     cost, solved_at = _cost(problem, line, rects), at
     at = np.where(pinned, at, (at / FINE).round() * FINE)
     best = cost(at)
@@ -235,10 +224,10 @@ def _tuned(problem: Problem, lie: Cells, *, grid: bool = True) -> Cells:
     return dict(zip(lie, map(tuple, at[line].round(4).tolist()), strict=True))
 
 
-def _lines(problem: Problem, rects: np.ndarray, *, grid: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _lines(problem: Problem, rects: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(r, 4) int which wall line every side of every rectangle lies on, (l,) where lines are, (l,) which are fixed."""
     steps, border = np.tile(problem.steps, 2), np.array([*problem.voids, (0.0, 0.0, *problem.extents)])
-    everything = np.concatenate([rects, (border / steps).round() * steps if grid else border])
+    everything = np.concatenate([rects, (border / steps).round() * steps])  # as the solver has it
     exact = np.concatenate([rects, border])
     joined = networkx.Graph()
     sides = [(r, s) for r in range(len(everything)) for s in range(4)]

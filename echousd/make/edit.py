@@ -1,4 +1,4 @@
-"""Change the graph of a finished room and make anew only what the change touches.
+"""Change the graph of a finished room and make anew only what the change touches; take that back, make it again.
 
 What attends, stands on or hangs over what is put elsewhere goes along, and what is free makes way.
 """
@@ -23,14 +23,20 @@ from echomodel.objective import Plan, faults_of
 from echomodel.objective.support import ON_CEILING
 from echomodel.progress import StageListener, StageTimer
 from echomodel.vocabulary import vocabulary
+from echousd.folder import history
+from echousd.folder.folder import held
+from echousd.folder.found import check_ours, layer_over, own_root, room_at
 from echousd.graph import SceneGraph, consistency
 from echousd.graph.arrays import graph_batch, one_thread
+from echousd.graph.changes import EditRequest
 from echousd.graph.floors import check_space
 from echousd.make.finished import Room
 from echousd.make.furnishing import Brief, box_fields, boxes_of, furnished, with_boxes
 from echousd.make.layouts import check_objects, model_of
 from echousd.make.reading import SavedRoom, read_room
+from echousd.make.save import write_pictures
 from echousd.make.verdicts import layout_outcome, warn_of_faults
+from echousd.make.wishes import artists_wishes, wished
 from echousd.options import OF_NEW, Look, RoomOptions, takes_options
 from echousd.place.living import plan_to_live_in, unusual
 from echousd.place.search import LIT
@@ -43,12 +49,13 @@ if TYPE_CHECKING:
     from echomodel.protocols import RoomModel
 
 wishes_of = Late("echousd.assets.choose:wishes_of")
+WISHES = tuple(EditRequest.__dataclass_fields__)
 
 
 @takes_options(OF_NEW)
 def edit(
-    room: str | Path, graph: SceneGraph, *, model: RoomModel | None = None, outside: Sequence[str | Path] = (),
-    progress: StageListener | None = None, **changes: Any,
+    room: str | Path, graph: SceneGraph | None = None, *, model: RoomModel | None = None,
+    outside: Sequence[str | Path] = (), progress: StageListener | None = None, **changes: Any,
 ) -> Room:  # fmt: skip
     """A room whose graph was changed; objects that the change does not touch keep box, mesh and files.
 
@@ -57,24 +64,30 @@ def edit(
     relation or physics would not hold otherwise.
 
     Arguments:
-        room: root layer of a room that `generate` made.
-        graph: what its graph (`read_room(room).graph`) shall become; a floor or openings that it leaves open stay
-            those of the room.
+        room: root layer or folder of a room that `generate` made.
+        graph: what its graph (`read_graph(room)`) shall become; a floor or openings that it leaves open stay those of
+            the room. None = as the wishes among `changes` say.
         model, outside, progress: as for `generate`.
-        changes: options of what is new (`RoomOptions`); without them `shapes` and `faces` are those of the room.
+        changes: wishes in the words of `echousd edit`, lists such as `add=["stool:stool"]`, and options of what is new
+            (`RoomOptions`); without these `shapes` and `faces` are those of the room.
 
     Raises ValueError as `generate` and `read_room` do, and for a room that other weights than those that ship made if
     neither `model` nor `weights` is given. Warns where the weights are not those that made the room, and of
     faults as `generate` does.
     """
-    if wrong := sorted(changes.keys() - set(OF_NEW)):
-        raise ValueError(f"{wrong[0]} is no option of an edit, allowed: {', '.join(OF_NEW)}")
+    if wrong := sorted(changes.keys() - {*OF_NEW, *WISHES}):
+        raise ValueError(f"{wrong[0]} is no option of an edit, allowed: {', '.join((*WISHES, *OF_NEW))}")
+    words = {name: changes.pop(name) for name in WISHES if name in changes}
+    wish = EditRequest(**{name: [text] if isinstance(text, str) else text for name, text in words.items() if text})
+    if (graph is None) == (wish == EditRequest()):
+        raise ValueError(f"an edit takes either a graph or wishes ({', '.join(WISHES)})")
     changes = {name: value for name, value in changes.items() if value is not None}
     RoomOptions(**changes)  # what is not allowed is told before the room is read
     timer = StageTimer(progress)
     with timer.stage("read"):
-        saved = read_room(room)
-    manifest, beside = saved.manifest, Path(room).parent
+        saved = read_room(room := room_at(Path(room)))
+    graph, outside = graph or wished(saved, wish), (*outside, *wish.folders)
+    manifest, beside = saved.manifest, room.parent
     asked = RoomOptions(**{name: manifest[name] for name in Look.model_fields} | changes)
     wishes = partial(wishes_of, asked, outside)
     check_objects(graph, str(room))
@@ -104,7 +117,7 @@ def edit(
     if shaped or moving:
         with timer.stage("load"), one_thread():
             used = model_of(asked, model)
-        _compare(manifest, used, chosen=bool(model or asked.weights), root=Path(room))
+        _compare(manifest, used, chosen=bool(model or asked.weights), root=room)
         made_by = replace(made_by, preset=used.preset, model=used.hash or made_by.model)
         again = shapes in ("parts", "sdf") or (shapes in ("library", "guided") and asked.assets is not None)
         shapes = asked.shapes or (shapes if again else default_source(used))
@@ -113,10 +126,46 @@ def edit(
     files = {asset: saved.carried[asset] for asset in names.values()}
     after = furnished(Brief(
         graph, graph, manifest["name"], asked, shapes, made_by, wishes, used, timer, there, geometry, names, files,
-        edited=Path(room), moving=moving, change=graph_edit(saved.graph, graph), in_the_way=way, notes=(*crowded, *odd),
+        edited=room, moving=moving, change=graph_edit(saved.graph, graph), in_the_way=way, notes=(*crowded, *odd),
     ))  # fmt: skip
     warn_of_faults(after)
     return after
+
+
+def update(layer: str | Path, **given: Any) -> Room:
+    """A room brought up to date with what a stronger layer of somebody's changes: relations, objects, transforms.
+
+    What the layer (or the one over a room in its folder) moves stays where it was put, locked; others make way.
+    `given`: model, outside, progress and options of what is new, as for `edit`. Raises ValueError as that does, for a
+    folder with no such layer or several, and for one that changes nothing.
+    """
+    own, graph, _ = artists_wishes(layer_over(Path(layer)))
+    return edit(own, graph, **given)
+
+
+def undo(room: str | Path, *, wait: bool = False) -> tuple[str, ...]:
+    """Take the last edit of a room (root layer or folder) back, byte for byte; returns its steps, a line each.
+
+    `wait`: for another process that writes the room, instead of raising. Raises ValueError where there is no edit, or
+    somebody changed a file of the room since; nothing is changed then.
+    """
+    return _stepped(Path(room), "undo", wait)
+
+
+def redo(room: str | Path, *, wait: bool = False) -> tuple[str, ...]:
+    """Make again what `undo` took back last, byte for byte; arguments, result and errors are as there."""
+    return _stepped(Path(room), "redo", wait)
+
+
+def _stepped(place: Path, run: str, wait: bool) -> tuple[str, ...]:
+    """Make a step of a room's history, and its pictures anew where it has some; a run that was killed is finished."""
+    check_ours(root := own_root(room_at(place)))
+    with held(root.parent, wait=wait, run=run) as finished:
+        shown = finished or root.with_suffix(".png").is_file()  # who wanted no picture gets none
+        steps = history.steps_of(root, run) if finished == run else getattr(history, run)(root)
+        if shown:
+            write_pictures(root)
+    return steps
 
 
 made_of = attrgetter("category", "size", "shapes", "asset")

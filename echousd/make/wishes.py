@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,10 +15,12 @@ from echousd.graph.changes import EditRequest
 from echousd.graph.starting import ONE_IS_ENOUGH
 from echousd.graph.text import stating, without
 from echousd.graph.titles import composed, identifier_of, is_title, name_of
-from echousd.make.pipeline import with_own_pieces
+from echousd.make.finished import Room
+from echousd.make.pipeline import generate, with_own_pieces
 from echousd.make.reading import SavedRoom, read_room
 from echousd.place.living import living_faults
 from echousd.room import RoomData
+from echousd.stage.apart import check_apart
 from echousd.stage.files import open_stage
 from echousd.stage.foreign import foreign_pieces
 from echousd.stage.read import find_rooms
@@ -77,7 +80,7 @@ def artists_wishes(root: Path) -> tuple[Path, SceneGraph, tuple[str, ...]]:
 
     Objects that the layer moves or turns are fixed where it puts them, and locked.
 
-    Raises ValueError where `root` is no layer over a room of ours.
+    Raises ValueError where `root` is no layer over a room of ours, or changes nothing.
     """
     theirs = read_room(root)
     own = own_root(root)
@@ -94,6 +97,8 @@ def artists_wishes(root: Path) -> tuple[Path, SceneGraph, tuple[str, ...]]:
         if np.linalg.norm(shift) > MOVED or abs(math.remainder(turn, 2 * math.pi)) > TURNED:
             graph = _placed(graph, theirs, name, anew=True).lock(name)
             moved.append(name)
+    if not ours.graph.diff(graph).lines():
+        raise ValueError(f"{root}: changes nothing about the room")
     return own, graph, tuple(moved)
 
 
@@ -146,20 +151,34 @@ def _numbers(wish: str, text: str, rest: str, counts: tuple[int, ...], allowed: 
     return numbers
 
 
+def adopt(
+    stage: str | Path, *, room: str | None = None, add: Sequence[str] | None = None, relate: Sequence[str] = (),
+    names: bool = False, **given: Any,
+) -> Room:  # fmt: skip
+    """Complete a stage that others began: its furniture stays where and as it is, new pieces stand around it.
+
+    Arguments:
+        stage: a stage with semantics labels and bounds, which is not written; the room refers to its pieces.
+        room: room type, None = as the stage's words and furniture say.
+        add: new objects as `name:category`, None = what such a room usually holds and this one lacks.
+        relate: relations, `lamp close by sofa`.
+        names: what has no label is known by the name of its asset or prim.
+        given: options and all else that `generate` takes.
+
+    Raises ValueError for a stage that cannot be read, that has nothing to adopt, or that has a scene graph already, and
+    as `generate` does.
+    """
+    check_apart(stage)
+    return generate(adopted(Path(stage), room=room, add=add, relate=relate, names=names), **given)
+
+
 def adopted(
     file: Path, *, room: str | None = None, add: Sequence[str] | None = None, relate: Sequence[str] = (),
     names: bool = False,
 ) -> SceneGraph:  # fmt: skip
     """The graph of a stage of somebody else's, completed: its objects are locked where they stand and refer to it.
 
-    Arguments:
-        file: a stage with semantics labels and bounds; it is never written.
-        room: room type, None = as the stage's words and furniture say.
-        add: new objects as `name:category`, None = what such a room usually holds and this one lacks.
-        relate: relations, `lamp close by sofa`.
-        names: what has no label is known by the name of its asset or prim.
-
-    Raises ValueError for a stage that cannot be read, that has nothing to adopt, or that has a scene graph already.
+    Arguments and errors are those of `adopt`.
     """
     stage = open_stage(file)
     if find_rooms(stage):

@@ -11,10 +11,11 @@ from echomodel.objective.sizes import size_range
 from echomodel.rules.geometry import BoxesLike, Spread
 from echousd.graph import SceneGraph
 from echousd.graph.arrays import triplets_of
+from echousd.room import Found
 
 
 @dataclass(frozen=True)
-class LivingFault:
+class LivingFault(Found):
     """An object that breaks a living rule, perhaps about another one, by a margin (metres, radians or a share)."""
 
     object: str
@@ -22,11 +23,6 @@ class LivingFault:
     other: str | None
     margin: float
     says: str
-
-    def to_json(self) -> dict:
-        """The entry of reports and manifests."""
-        about = {"object": self.object, "rule": self.rule, "other": self.other}
-        return {**about, "margin": round(self.margin, 4), "says": self.says}
 
 
 def living_faults(

@@ -49,15 +49,9 @@ class ImportedLook:
 
 
 def import_texture_job(
-    room: str | Path,
-    job: str | Path,
-    *,
-    name: str = "",
-    skip: tuple[str, ...] = (),
-    preview: bool = True,
-    force: bool = False,
-    wait: bool = False,
-) -> ImportedLook:
+    room: str | Path, job: str | Path, *, name: str = "", skip: tuple[str, ...] = (), preview: bool = True,
+    force: bool = False, wait: bool = False,
+) -> ImportedLook:  # fmt: skip
     """Bring what a texturing tool made of a job back as a look of the room.
 
     Written are `looks/<name>.usda`, the room's strongest sublayer from then on, and beside it the pictures and the

@@ -53,6 +53,17 @@ def bounds(stage, path, to_metres):
     return to_metres(np.array([box.GetMin(), box.GetMax()]))
 
 
+def test_python_completes_a_stage_as_the_command_does(loft, tmp_path, echousd_command):
+    words = ("--add", "lamp:floor_lamp", "--relate", "lamp close by bed", "--shapes", "boxes", "--dress", "none")
+    done = echousd_command("adopt", loft, "-o", tmp_path / "room", *words, "--no-preview")
+    assert done.code in (0, 1), done.err
+    given = {"shapes": "boxes", "dress": "none", "preview": False}
+    made = echousd.adopt(loft, add=["lamp:floor_lamp"], relate=["lamp close by bed"], **given)
+    assert made.graph.node("bed").locked
+    root = made.save(tmp_path / "other" / "room")
+    assert root.read_bytes() == (tmp_path / "room" / "room.usda").read_bytes()
+
+
 def test_a_half_furnished_stage_is_completed_and_left_as_it_is(loft, tmp_path):
     before = hashlib.sha256(loft.read_bytes()).hexdigest()
     graph = adopted(loft, add=["wardrobe:wardrobe"], relate=["wardrobe taller than bed"])

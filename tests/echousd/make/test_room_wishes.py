@@ -3,6 +3,7 @@
 import hashlib
 import json
 import math
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -182,6 +183,51 @@ def test_a_scale_of_a_stronger_layer_is_said_for_boxes_do_not_follow(root):
     layer.Save()
     with pytest.warns(UserWarning, match=r"</Room/Objects/wardrobe> is scaled by 1.30 x 1.00 x 1.00: .* --resize does"):
         read_room(layer.realPath)
+
+
+def test_python_edits_in_the_words_of_the_command_line(root, tmp_path, echousd_command):
+    other = tmp_path / "other"
+    shutil.copytree(root.parent, other)
+    words = ("--add", "chair:nightstand", "--relate", "chair close by wardrobe", "--lock", "bed")
+    assert echousd_command("edit", root, "--shapes", "boxes", *words).code in (0, 1)
+    wishes = {"add": ["chair:nightstand"], "relate": "chair close by wardrobe", "lock": ["bed"]}
+    made = echousd.edit(other, **wishes, shapes="boxes").save(other, preview=False)
+    assert made.read_bytes() == root.read_bytes()
+    assert echousd.read_graph(other) == echousd.read_graph(root)  # a folder stands for its room
+    one_of = r"takes either a graph or wishes \(remove, unrelate, relabel, add"
+    with pytest.raises(ValueError, match=one_of):
+        echousd.edit(other)
+    with pytest.raises(ValueError, match=one_of):
+        echousd.edit(other, echousd.read_graph(other), lock="bed")
+    with pytest.raises(ValueError, match="paint is no option of an edit, allowed: remove, unrelate"):
+        echousd.edit(other, paint="red")
+
+
+def test_python_takes_edits_back_and_makes_them_again(root):
+    before = told(root.parent)
+    echousd.edit(root, remove=["wardrobe"]).save(root.parent, preview=False)
+    after = told(root.parent)
+    assert "- object wardrobe (wardrobe)" in echousd.undo(root.parent)
+    assert told(root.parent) == without_pictures(before)
+    assert "- object wardrobe (wardrobe)" in echousd.redo(root)
+    assert told(root.parent) == without_pictures(after)
+    with pytest.raises(ValueError, match="no edit that was taken back can be made again"):
+        echousd.redo(root.parent)
+
+
+def test_python_brings_a_room_up_to_date_with_a_layer_over_it(root):
+    path = root.with_name("mine.usda")
+    layer = Sdf.Layer.CreateNew(str(path))
+    layer.subLayerPaths = [f"./{root.name}"]
+    stage = Usd.Stage.Open(layer)
+    stage.GetPrimAtPath("/Room/Objects/wardrobe").GetAttribute("xformOp:translate").Set((1.0, 0.0, 1.1))
+    layer.Save()
+    made = echousd.update(root.parent)
+    assert made.graph.node("wardrobe").locked
+    np.testing.assert_allclose(made.boxes.position[made.names.index("wardrobe")], (1.0, 0.0, 1.1), atol=1e-3)
+    made.save(root.parent, preview=False)
+    with pytest.raises(ValueError, match=r"mine\.usda: changes nothing about the room"):
+        echousd.update(path)
 
 
 @pytest.mark.parametrize("call", [
