@@ -239,11 +239,11 @@ def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, ofte
     found[-1] = found[4] > 0
     gloss = world.scenery.gloss.take(seen.face).reshape(shape)[coarse]
     reach = (
-        (np.s_[:3], RINGS[:2]), (np.s_[3:4], RINGS[:3], gloss), (np.s_[4:5], () if inside else RINGS),
-        (np.s_[5:-1], RINGS[:2] if world.fine else ()), (np.s_[-1:], RINGS[:1]),
+        (np.s_[:3], RINGS[:3]), (np.s_[3:4], RINGS[:3], gloss), (np.s_[4:5], () if inside else RINGS),
+        (np.s_[5:-1], RINGS[:3] if world.fine else ()), (np.s_[-1:], RINGS[:1]),
     )  # fmt: skip
     found = smooth_light(found.reshape(-1, *asked.shape), known[0], known[1], reach)
-    far = ((np.s_[:3], RINGS[2:]), (np.s_[5:-1], RINGS[2:] if world.fine else ()))
+    far = ((np.s_[:3], RINGS[3:]), (np.s_[5:-1], RINGS[3:] if world.fine else ()))
     found += (1 - share) * (smooth_light(found.copy(), known[0], known[1], far) - found)
     mixed = ((found[-1] > 0.01) & (found[-1] < 0.99)).repeat(2, 0).repeat(2, 1)[: shape[0], : shape[1]]
     light, weight = np.zeros((world.rows, *shape), np.float32), np.zeros(shape, np.float32)
