@@ -159,7 +159,7 @@ def clusters(setting: Setting) -> None:
             first = setting.put_first((t for t in _by(host, wish, rng) if near.intersects(t.footprint)), margin=0.03)
             if first is None:
                 continue
-            for kind in wish.beside:
+            for kind in (str(rng.choice(among)) for among in wish.beside):
                 (size, variant), turn = usual(kind, rng), float(rng.uniform(-3, 3))
                 places = first.position + np.insert(1.15 * around(first, size, rng), 1, 0.0, axis=1)
                 setting.put_first((Thing(kind, size, place, turn, "", variant) for place in places), margin=0.02)

@@ -18,7 +18,7 @@ class Wish:
 
     of: tuple[str, ...]
     at: tuple[Any, ...]
-    beside: tuple[str, ...] = ()  # `with`
+    beside: tuple[tuple[str, ...], ...] = ()  # `with`
     by: str = ""
     turn: str = ""
     share: float = 1.0
@@ -32,6 +32,7 @@ class Story:
     tops: Mapping[str, tuple[Wish, ...]]
     shelves: tuple[str, ...]
     beds: tuple[Wish, ...]
+    seats: tuple[Wish, ...]
     floor: tuple[Wish, ...]
 
 
@@ -40,14 +41,14 @@ def story(resident: str = "") -> Story:
     """The story of one of `RESIDENTS`, of anyone where nobody is told."""
     rows = TABLE["anyone"] | TABLE.get(resident, {})
     tops = TABLE["anyone"]["tops"] | TABLE.get(resident, {}).get("tops", {})
-    floor, beds = (tuple(map(_wish, rows[where])) for where in ("floor", "beds"))
-    return Story({top: tuple(map(_wish, wishes)) for top, wishes in tops.items()}, tuple(rows["shelves"]), beds, floor)
+    wishes = {where: tuple(map(_wish, rows[where])) for where in ("beds", "seats", "floor")}
+    return Story({top: tuple(map(_wish, of)) for top, of in tops.items()}, tuple(rows["shelves"]), **wishes)
 
 
 def _wish(row: dict[str, Any]) -> Wish:
     at = (spot for one in row["at"] for spot in (TABLE["places"].get(one, [one]) if isinstance(one, str) else [one]))
     rest = {word: row[word] for word in ("by", "turn", "share", "needs") if word in row}
-    return Wish(tuple(row["of"]), tuple(at), tuple(row.get("with", ())), **rest)
+    return Wish(tuple(row["of"]), tuple(at), tuple(map(tuple, row.get("with", ()))), **rest)
 
 
 def guessed(room: str, furniture: Iterable[Category]) -> str:

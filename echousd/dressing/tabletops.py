@@ -11,6 +11,7 @@ from echomodel.dressing import KINDS, usual
 from echomodel.late import Late
 from echomodel.triangles import area_normals, spans_of
 from echousd.dressing.setting import APART, EDGE, Setting, Standing, Thing, around, rectangle
+from echousd.dressing.stories import TABLE
 from echousd.shapes.geometry import Geometry
 
 shelved_books = Late("echousd.dressing.shelved:shelved_books")
@@ -18,7 +19,7 @@ laid = Late("echousd.dressing.laid:laid")
 
 LEVEL = 0.006  # metres: what differs less in height is one level
 LEAST, CRACK = 0.012, 5e-4  # m² of a level; metres: cracks between triangles on the grid that joins them
-AIR = 0.6  # metres of air above a top that nothing covers
+AIR = 0.9  # metres of air above a top that nothing covers
 ROW = 0.8  # metres of books side by side at most, so that all are drawn
 
 
@@ -134,15 +135,11 @@ def _between(corners: np.ndarray, low: float, high: float) -> np.ndarray:
 LAID = 0.6  # share of rooms whose dining table is set
 EYE = 1.7  # metres: what is put higher cannot be seen
 CASES = ("cabinet", "shelf")  # looks of what books and baskets stand in and on: no cistern, no fridge
-STRAIGHT = ("laptop", "tray", "monitor", "keyboard")  # stand parallel to what they stand on
-WARE = ("plates", "bowl", "glass", "cup", "bottles")  # in kitchens
-LINEN = ("folded_throw", "basket", "bottles", "folded_throw")  # in baths and laundries
-BARE = ("coat_rack", "toy_box", "hall")  # tops whose shelves and seats hold no books
 
 
 def tabletops(setting: Setting) -> None:
     """Things on everything that carries."""
-    for host in setting.of("board", "storage"):
+    for host in setting.of("board", "storage", *setting.story.tops):
         levels = surfaces(host)
         if not levels:
             continue
@@ -153,7 +150,7 @@ def tabletops(setting: Setting) -> None:
         tops = [s for s in levels if s.area.area > 0.3 * footprint and s.host.position[1] + s.y < EYE]
         if name in setting.story.tops and tops:
             _top(setting, host, tops[0], name)
-        if host.row.role == "storage" and host.row.look in CASES and name not in BARE:
+        if name in TABLE["stocked"] or (host.row.role == "storage" and host.row.look in CASES):
             for surface in levels:
                 if surface is not (tops[0] if tops and name in setting.story.tops else None):
                     stocked(setting, host, surface)
@@ -175,12 +172,12 @@ def _top(setting: Setting, host: Standing, surface: Surface, name: str) -> None:
         if not setting.has(wish.share, rng) or (wish.needs and wish.needs not in taken):
             continue
         for kind in [k for k in order if k not in taken] or order:
-            straight = kind in STRAIGHT or surface.area.area < 0.1
+            straight = kind in TABLE["straight"] or surface.area.area < 0.1
             thing = surface.put(setting, kind, wish.at, turn=0.0 if straight else turn, word=str(number))
             if thing:
                 taken.add(kind)
                 for place, other in enumerate(wish.beside):
-                    surface.put(setting, other, word=f"{number} {place}", beside=thing)
+                    surface.put(setting, str(rng.choice(other)), word=f"{number} {place}", beside=thing)
                 break
 
 
@@ -191,8 +188,8 @@ def stocked(setting: Setting, host: Standing, surface: Surface) -> None:
     rng = setting.rng(host.name, "shelf", f"{surface.y:.2f}")
     wide, deep = 2 * surface.span[1]
     side = 1.0 if rng.random() < 0.5 else -1.0
-    ware = WARE if host.row.task else LINEN if setting.use == "wet" else ()
-    if setting.has(0.85, rng) and not ware:
+    ware = TABLE["stocked"].get("task" if host.row.task else setting.use or host.row.top)
+    if ware is None and setting.has(0.85, rng):
         length = min(wide * rng.uniform(0.4, 0.75), ROW)
         for share in (1.0, 0.6, 0.35):
             tall = min(surface.air - 0.015, rng.uniform(0.2, 0.27))
@@ -206,7 +203,7 @@ def stocked(setting: Setting, host: Standing, surface: Surface) -> None:
                 if setting.full:
                     shelved_books(setting, row, rng)
                 break
-    wanted = [str(kind) for kind in rng.permutation(ware or setting.story.shelves)]
+    wanted = [str(kind) for kind in rng.permutation(setting.story.shelves if ware is None else ware)]
     for number in range(2):
         if rng.random() < 0.85:
             places = [(x * side, 0.2) for x in (0.75, 0.4, 0.95, 0.1, -0.2, -0.6)]

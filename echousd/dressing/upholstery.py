@@ -1,4 +1,4 @@
-"""Cushions and what somebody left on beds, cushions on sofas and armchairs, throws over all of them."""
+"""Cushions and what somebody left on beds, sofas and armchairs, throws over all of them."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from echomodel.dressing import names_of, usual
 from echomodel.dressing.textiles import LEAN
 from echomodel.late import lates
 from echousd.dressing.setting import Setting
-from echousd.dressing.soft_tops import Design, Seat, across, corners_of, let_down, lying, put
+from echousd.dressing.soft_tops import LEVEL, Design, Seat, across, corners_of, let_down, lying, put
 
 cushions_on, over_arm = lates("echousd.dressing.seats", "cushions_on", "over_arm")
 WIDE_BED, OVER = 1.3, 0.036  # metres: of a throw's top over a bed, whose cover lies in folds
@@ -46,11 +46,11 @@ def bed_cushions(setting: Setting) -> None:
 
 
 def on_covers(setting: Setting) -> None:
-    """What somebody left on the largest bed, as the story has it."""
-    for host in sorted(setting.of("bed"), key=lambda o: -float(o.size[0]))[:1]:
-        seat = Seat.of(host)
-        for number, wish in enumerate(setting.story.beds):
-            rng = setting.rng(host.name, "cover", str(number))
+    """What somebody left on the largest bed and on seats, as the story has it."""
+    largest = sorted(setting.of("bed"), key=lambda o: -float(o.size[0]))[:1]
+    for number, wish in enumerate((*setting.story.beds, *setting.story.seats)):
+        for host in setting.of(wish.by) if wish.by else largest:
+            rng, seat = setting.rng(host.name, "cover", str(number)), Seat.of(host)
             if seat is None or not setting.has(wish.share, rng):
                 continue
             kind, turn = str(rng.choice(wish.of)), float(rng.uniform(-0.5, 0.5))
@@ -59,6 +59,8 @@ def on_covers(setting: Setting) -> None:
                 x, z = (0.0, 0.0) if at == "pillows" else np.array(at) * host.size[[0, 2]] / 2
                 spot = seat.before_pillows(x, size) if at == "pillows" else np.array([x, seat.level, z])
                 spot = lying(host, seat, spot, turn, size, corners_of(kind, size, variant))
+                if spot is not None and wish.by:  # a seat is fuller than its solids
+                    spot[1] = max(spot[1], (seat.below(spot, size) or 0.0) - LEVEL)
                 if put(setting, host, spot, kind, size, turn, variant):
                     break
 

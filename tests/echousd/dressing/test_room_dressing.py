@@ -495,7 +495,7 @@ def test_rows_of_books_on_long_shelves_are_drawn_whole():
     rows = []
     surface = SimpleNamespace(y=0.5, air=0.4, span=np.array([(0.0, 0.0), (1.2, 0.15)]), closed=False)
     surface.area, surface.put = shapely.box(-1.2, -0.15, 1.2, 0.15), lambda *_, size=None, **__: rows.append(size)
-    host = SimpleNamespace(name="shelf", position=np.zeros(3), row=SimpleNamespace(task=""))
+    host = SimpleNamespace(name="shelf", position=np.zeros(3), row=SimpleNamespace(task="", top=""))
     for seed in range(20):
         tabletops.stocked(Setting({}, SQUARE, (), 2.7, True, False, seed), host, surface)
     size = max((size for size in rows if size is not None), key=lambda size: size[0])

@@ -13,6 +13,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.dressing import tabletops
 from echousd.dressing.dress import dressed, setting_of
 from echousd.dressing.setting import Setting, Thing, standing
+from echousd.dressing.soft_tops import Seat
 from echousd.dressing.stories import TABLE, guessed, story
 from echousd.dressing.walls import mirror_over
 from echousd.graph import SceneGraph
@@ -62,16 +63,18 @@ def kinds_on(room, name):
 
 
 def test_every_resident_has_a_story_of_kinds_and_tops_that_there_are():
-    assert set(TABLE) == {"places", "once", "hung", "anyone", *RESIDENTS}
-    assert set(TABLE["once"]) <= {*KINDS}
+    assert set(TABLE) == {"places", "once", "straight", "stocked", "hung", "anyone", *RESIDENTS}
+    for kinds in (TABLE["once"], TABLE["straight"], *TABLE["stocked"].values()):
+        assert {*kinds} <= {*KINDS}
     tops = {row.top for row in vocabulary().categories}
     words = {word for row in vocabulary().categories for word in (row.role, row.top, *row.invites)}
     for who in ("", *RESIDENTS):
         told = story(who)
-        wishes = [*told.beds, *told.floor, *(wish for top in told.tops.values() for wish in top)]
-        assert {kind for wish in wishes for kind in (*wish.of, *wish.beside)} | {*told.shelves} <= {*KINDS}
+        wishes = [*told.beds, *told.seats, *told.floor, *(wish for top in told.tops.values() for wish in top)]
+        assert {kind for wish in wishes for among in (wish.of, *wish.beside) for kind in among} <= {*KINDS}
+        assert {*told.shelves} <= {*KINDS}
         assert set(told.tops) <= tops
-        assert {wish.by for wish in told.floor} <= words
+        assert {wish.by for wish in (*told.seats, *told.floor)} <= words
         assert all(wish.at for wish in wishes)
 
 
@@ -132,6 +135,33 @@ def test_what_lies_on_a_bed_lies_within_it(rooms):
             if thing.on == "bed" and not KINDS[thing.kind].lies:
                 assert np.abs(bed.in_plan(thing.position)).max() < bed.size[2] / 2
                 assert bed.position[1] + 0.2 < thing.position[1] < bed.top
+
+
+LOUNGE = """
+room: {type: living_room, size: [4.6, 4.2]}
+nodes:
+  - {name: sofa, category: sofa}
+  - {name: armchair, category: armchair}
+  - {name: bench, category: bench}
+  - {name: coffee_table, category: coffee_table}
+"""
+
+
+def test_what_was_left_on_seats_and_benches_lies_in_sight():
+    """On the cloth, not on the solids a few centimetres below it."""
+    setting = dressed(echousd.generate(SceneGraph.from_yaml(LOUNGE), seed=4, dress="full"))
+    left = [t for t in setting.placed if t.kind in {kind for wish in setting.story.seats for kind in wish.of}]
+    on = {name: [thing for thing in left if thing.on == name] for name in ("sofa", "armchair")}
+    assert on["sofa"]
+    assert on["armchair"]
+    for name, things in on.items():
+        host = setting.objects[name]
+        for thing in things:
+            there = np.insert(host.in_plan(thing.position), 1, 0.0)
+            cloth = Seat.of(host).below(there, thing.size)
+            assert thing.position[1] - host.position[1] == pytest.approx(cloth, abs=0.02)
+            assert thing.position[1] - host.position[1] > cloth - 0.01
+    assert any(thing.on == "bench" for thing in setting.placed)
 
 
 @pytest.mark.parametrize("blocked", [False, True])
