@@ -23,26 +23,16 @@ def _outline(radii: list[float], size: Size) -> np.ndarray:
     return np.stack([np.interp(fine, heights, radii) * min(size[0], size[2]) / 2, fine * size[1]], 1)
 
 
-SHAPES = (
-    [0.55, 0.95, 1.0, 0.85, 0.5, 0.42, 0.5],
-    [0.5, 0.75, 0.95, 1.0, 0.9, 0.6, 0.38, 0.42],
-    [0.8, 0.85, 0.9, 0.95, 1.0],
-    [0.6, 1.0, 0.8, 0.45, 0.35, 0.35, 0.4],
-)
+SHAPES = ([0.55, 0.95, 1.0, 0.85, 0.5, 0.42, 0.5], [0.5, 0.75, 0.95, 1.0, 0.9, 0.6, 0.38, 0.42])
 POTS = ([0.78, 0.9, 1.0], [0.95, 1.0, 1.0], [0.7, 1.0, 0.92], [0.6, 0.95, 1.0, 0.86], [1.0, 0.86, 0.8])
 POTTERY = ("ceramic", "ceramic", "enamel", "wicker", "soil", "metal")
-
-
-def vase(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A vase alone."""
-    return [vessel(_outline(SHAPES[int(rng.integers(len(SHAPES)))], size), 0.006, "ceramic", 0.05)]
 
 
 def flowers(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A vase with branches."""
     w, h, d = size
     body = np.array([w * 0.5, h * 0.42, d * 0.5])
-    parts: list[Solid] = [vessel(_outline(SHAPES[int(rng.integers(2))], body), 0.006, "ceramic", 0.05)]
+    parts: list[Solid] = [vessel(_outline(SHAPES[int(rng.integers(len(SHAPES)))], body), 0.006, "ceramic", 0.05)]
     count = int(rng.integers(5, 8))
     for number in range(count):
         yaw = 2 * np.pi * (number + rng.uniform(-0.2, 0.2)) / count
