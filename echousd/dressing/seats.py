@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from echomodel.dressing.textiles import LEAN
+from echomodel.boxes2d import upright
 from echousd.dressing.setting import Setting, Standing, Thing
 from echousd.dressing.soft_tops import (
     LEVEL,
@@ -15,6 +15,7 @@ from echousd.dressing.soft_tops import (
     across,
     clear_of,
     corners_of,
+    heights_of,
     let_down,
     put,
 )
@@ -22,6 +23,9 @@ from echousd.dressing.soft_tops import (
 MORE = (1.9, 2.4)  # metres of a sofa with a third cushion in its middle, and with two
 OVER = 0.019  # metres of a throw's top over an arm
 RISE = 0.06  # metres that an arm rises along a throw at most: off a steeper one it slides, and a tub's walls are round
+# Shares of a cushion's width and height at which is looked for what is behind it, metres within which that is; from
+# where on a back is round; by which forms of cushions differ.
+ACROSS, UPWARDS, REACH, BENT, BY = np.linspace(-0.4, 0.4, 5), np.linspace(0.2, 0.9, 4), 0.4, 0.02, 0.02
 RIDGE = 0.1  # metres that an arm is higher than the seat at least so that a throw hangs over it
 
 
@@ -40,10 +44,15 @@ def cushions_on(
     ends += [(end, odd) for end in dict.fromkeys((-apart, apart)) if more and wide > MORE[0]]
     for end, (kind, size, variant) in ends if wide > 1.3 else [(float(rng.choice([-0.6, 0.6])), narrow)]:
         turn = -0.28 * end * float(rng.uniform(0.3, 1.6))
-        for lean in (LEAN * size[1], 0.0):  # upright on what is too shallow
-            deep = size + np.array([0.0, 0.0, lean])
-            spot = standing_on(host, at_back(seat, end, deep), turn, deep, corners_of(kind, deep, variant))
-            if put(setting, host, spot, kind, deep, turn, variant):
+        if (spot := at_back(seat, end, size)) is None:
+            continue
+        aside, lean, bend = behind(host, spot, turn, size)
+        turn -= float(np.arctan(aside)) * (bend > BENT)
+        leant = np.clip([lean * size[1], bend], (0.1 * size[1], 0.0), (0.4 * size[1], 0.08)) // BY * BY
+        for lie in (tuple(leant.round(2).tolist()), (0.0, 0.0)):  # upright on what is too shallow
+            deep = size + np.array([0.0, 0.0, sum(lie)])
+            spot = standing_on(host, at_back(seat, end, deep), turn, deep, corners_of(kind, deep, variant, lie))
+            if put(setting, host, spot, kind, deep, turn, variant, lie):
                 break
 
 
@@ -60,6 +69,16 @@ def standing_on(
         if spot is not None and np.abs(spot - down).max() < LEVEL:
             return np.array([spot[0], down[1], spot[2]])
     return None
+
+
+def behind(host: Standing, spot: np.ndarray, turn: float, size: np.ndarray) -> np.ndarray:
+    """(3,) float of what is behind a turned cushion at a spot (3,): metres a metre that it is nearer at the right, and
+    further away over the seat, and metres that it is nearer at both sides than in the middle."""
+    corners = (host.geometry.mesh.triangles - spot) @ upright(turn)
+    ends = heights_of(corners[corners[..., 2].max(1) < size[2]][..., [0, 2, 1]], ACROSS * size[0], UPWARDS * size[1])
+    x, y = (line[ends > -REACH] for line in np.meshgrid(ACROSS * size[0], UPWARDS * size[1], indexing="ij"))
+    terms = np.stack([x, -y, (2 * x / size[0]) ** 2, 1 + 0 * x], 1)
+    return np.linalg.lstsq(terms, ends[ends > -REACH], rcond=None)[0][:3]
 
 
 def at_back(seat: Seat, end: float, size: np.ndarray) -> np.ndarray | None:

@@ -94,18 +94,19 @@ def heights_of(corners: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 def put(
-    setting: Setting, host: Standing, spot: np.ndarray | None, kind: str, size: np.ndarray, turn: float, variant: int
-) -> Thing | None:
+    setting: Setting, host: Standing, spot: np.ndarray | None, kind: str, size: np.ndarray, turn: float, variant: int,
+    lie: tuple[float, ...] = (),
+) -> Thing | None:  # fmt: skip
     """Put a thing on a spot (3,) of its host, turned in its frame; None where there is none or it is not clear."""
     if spot is None:
         return None
-    thing = Thing(kind, size, host.to_room(spot[None])[0], host.yaw + turn, host.name, variant)
+    thing = Thing(kind, size, host.to_room(spot[None])[0], host.yaw + turn, host.name, variant, lie=lie)
     return setting.put_first([thing], host=host.name, margin=0.0, floor=False)
 
 
-def corners_of(kind: str, size: np.ndarray, variant: int) -> np.ndarray:
+def corners_of(kind: str, size: np.ndarray, variant: int, lie: tuple[float, ...] = ()) -> np.ndarray:
     """(n, 3) float, metres: corners of what a thing collides with, in its own frame."""
-    return geometry_of(kind, tuple(size.tolist()), variant, ()).colliders[0].mesh.vertices
+    return geometry_of(kind, tuple(size.tolist()), variant, lie).colliders[0].mesh.vertices
 
 
 def upon(host: Standing, spot: np.ndarray, size: np.ndarray) -> np.ndarray | None:

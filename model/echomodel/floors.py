@@ -54,8 +54,7 @@ def signed_distance(points: Array, floor: Array) -> Array:
 def _inside(points: Array, start: Array, end: Array) -> Array:
     """(M, Q) bool: an odd number of walls lies to the +x side."""
     x, z = points[:, :, None, 0], points[:, :, None, 1]
-    crossed = (start[..., 1] > z) != (end[..., 1] > z)
-    return (crossed & (meeting(z, start, end, 1) > x)).sum(-1) % 2 > 0
+    return (((start[..., 1] > z) != (end[..., 1] > z)) & (meeting(z, start, end, 1) > x)).sum(-1) % 2 > 0
 
 
 def meeting(level: Array, start: Array, end: Array, axis: int) -> Array:

@@ -97,8 +97,7 @@ def floor_extents(
     short, long = (round(side * max(grown, 1.0), 1) for side in (short, long))
     x, z = (long, short) if rng.random() < along_x else (short, long)
     x = max([x, *(o.end for o in openings if o.edge % 2 == 0)])
-    z = max([z, *(o.end for o in openings if o.edge % 2 == 1)])
-    return x, z
+    return x, max([z, *(o.end for o in openings if o.edge % 2 == 1)])
 
 
 def floor_outline(

@@ -252,8 +252,7 @@ def load_rooms(path: Path, limit: int | None = None, *, held_out: bool = False) 
         raise ValueError(f"{path}: no such file or folder")
     if path.is_dir() or path.suffix == ".npz":
         rooms = RoomSet(path / "rooms" if (path / "rooms").is_dir() else path)
-        numbers = rooms.held_out.nonzero()[0] if held_out else range(len(rooms))
-        return [rooms.room(int(k)) for k in numbers[:limit]]
+        return [rooms.room(int(k)) for k in (rooms.held_out.nonzero()[0] if held_out else range(len(rooms)))[:limit]]
     return read_rooms(path)[:limit]
 
 

@@ -19,8 +19,7 @@ def picture(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid
     shown = shown or any_of("picture", "wide" if w > h else "tall", rng)
     x, back, front = w / 2, -d / 2, d / 2
     if not of:
-        canvas = box((-x, 0, back), (x, h, front - 0.001), "linen")
-        return [canvas, box((-x, 0, front - 0.001), (x, h, front), shown)]
+        return [box((-x, 0, back), (x, h, front - 0.001), "linen"), box((-x, 0, front - 0.001), (x, h, front), shown)]
     bar = slim * float(np.clip(0.035 * max(w, h), 0.014, 0.028))
     mount = float(np.clip(0.11 * min(w, h), 0.02, 0.09)) if mounted else 0.0
     parts = framed((-x, 0, back), (x, h, front), bar, of)
@@ -70,5 +69,4 @@ def cable(size: Size, rng: np.random.Generator) -> list[Solid]:
     bend = np.sin(np.pi * along) * np.sin(2 * np.pi * along * rng.uniform(0.6, 1.1) + rng.uniform(0, 3))
     x = bend / max(float(np.abs(bend).max()), 1e-6) * (w / 2 - radius)
     line = np.stack([x, np.full_like(x, radius), (along - 0.5) * (d - h)], 1)
-    plug = box((-0.011, 0, -d / 2), (0.011, h, -d / 2 + 0.04), "screen", h * 0.3)
-    return [tube(line, radius, "screen"), plug]
+    return [tube(line, radius, "screen"), box((-0.011, 0, -d / 2), (0.011, h, -d / 2 + 0.04), "screen", h * 0.3)]

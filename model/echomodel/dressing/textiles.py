@@ -113,17 +113,21 @@ CLOTHS = ("accent_cloth", "accent_plain", "accent_striped", "accent_checked", "b
 LEAN, UPRIGHT = 0.28, 0.225  # of its height that a top is behind its foot; metres, the deepest that is upright
 
 
-def cushion(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid]:
-    """A cushion on a side, full or slack, of one of some cloths or of a print, often corded; a deep one leans back."""
-    (w, h, _), lean = size, LEAN * size[1] if size[2] > UPRIGHT else 0.0
-    d, aside = size[2] - lean, float(rng.uniform(-0.12, 0.12)) * h if lean else 0.0
+def cushion(size: Size, rng: np.random.Generator, shown: str = "", lie: tuple[float, ...] = ()) -> list[Solid]:
+    """A cushion on a side, full or slack, of one of some cloths or of a print, often corded; a deep one leans back.
+
+    `lie`: metres that its top is behind its foot and its sides are before its middle, as what it lies against has it.
+    """
+    (w, h, _), (lean, bend) = size, lie or (LEAN * size[1] if size[2] > UPRIGHT else 0.0, 0.0)
+    d, aside = size[2] - lean - bend, float(rng.uniform(-0.12, 0.12)) * h if lean else 0.0
     cloth, corded = str(rng.choice(CLOTHS)), bool(rng.random() < 0.4)
     cord = str(rng.choice(("linen", "ebony", "blanket", "accent_plain")))
     w -= abs(aside)
     body = pillow((0, h / 2, 0), (w / 2, h / 2, d / 2), shown or cloth)
     made: list[Solid] = [replace(body, power=float(rng.uniform(1.7, 2.6)))]
     made += [tube(seam(body.half) + np.array([0, h / 2, 0]), 0.004, cord)] * corded
-    return [Slumped(material=one.material, of=one, tall=h, lean=lean, aside=aside) for one in made] if lean else made
+    form = {"tall": h, "lean": lean, "aside": aside, "bend": 4 * bend / w**2}
+    return [Slumped(material=one.material, of=one, **form) for one in made] if lean + bend else made
 
 
 lumbar_cushion = cushion  # long and low, for the small of the back

@@ -83,8 +83,7 @@ def shower(size: Size, style: Style, choices: Choices) -> list[Solid]:
     mixer = box((-0.12, 1.0, -z), (0.12, 1.05, -z + 0.055), radius=0.008)
     wall = box((-0.012, 0.95, -z), (0.012, 0.975, -z + 0.035))
     foot = box((-0.012, tray - 0.002, -z), (0.012, 1.0, -z + 0.012))  # pipes, up the wall
-    tubes = [tube(rail, 0.01), head, mixer, wall, foot]
-    return parts + of_role("shower_head", tubes, material="metal")
+    return parts + of_role("shower_head", [tube(rail, 0.01), head, mixer, wall, foot], material="metal")
 
 
 def bathtub(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -114,8 +113,7 @@ def mirror_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
         box((low + 0.002, 0.002, d / 2 - 0.024), (high - 0.002, top - 0.002, d / 2), "mirror", 0.002, "door")
         for low, high in pairwise(edges)
     ]
-    light = box((-0.35 * w, top - 0.004, -0.02), (0.35 * w, h, d / 2), "shade", 0.004, "light")
-    return [body, *doors, light]
+    return [body, *doors, box((-0.35 * w, top - 0.004, -0.02), (0.35 * w, h, d / 2), "shade", 0.004, "light")]
 
 
 def towel_radiator(size: Size, style: Style, choices: Choices) -> list[Solid]:

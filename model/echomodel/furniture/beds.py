@@ -35,8 +35,7 @@ def _headboard(style: Style, w: float, h: float, z: float) -> list[Solid]:
     if kind == "low":
         return [box((-w / 2, 0.02, z), (w / 2, h, z + t * 0.7))]
     if kind == "channels":
-        each = w / int(4 + 6 * style.tufting)
-        return [_padded((-w / 2, 0.1, z), (w / 2, h, z + t * 1.5), 2 * each, channels=True)]
+        return [_padded((-w / 2, 0.1, z), (w / 2, h, z + t * 1.5), 2 * (w / int(4 + 6 * style.tufting)), channels=True)]
     if kind == "cushions":
         low, high = (w * 0.25 - w * 0.23, h * 0.4, z + t * 0.4), (w * 0.25 + w * 0.23, h, z + t * 1.9)
         frame = box((-w / 2, 0.02, z), (w / 2, h * 0.85, z + t * 0.6))

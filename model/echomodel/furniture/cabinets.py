@@ -100,8 +100,7 @@ def tv_stand(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts, rect = carcass(size, style, foot_height(style, h, 0.45), solid=False)
     count = int(np.clip(round(w / choices.between("columns", 0.42, 0.62)), 2, 6))
     kinds, (_, y0, _, y1, _) = pattern(choices, count, {"drawer": 0.45, "open": 0.35, "door": 0.2}, 0.75), rect
-    middle = [(y0 + y1) / 2] if y1 - y0 > 0.25 else []
-    return parts + columns(rect, d, kinds, style, middle, 1 + (y1 - y0 > 0.28))
+    return parts + columns(rect, d, kinds, style, [(y0 + y1) / 2] if y1 - y0 > 0.25 else [], 1 + (y1 - y0 > 0.28))
 
 
 def pattern(choices: Choices, count: int, odds: dict[str, float], symmetry: float) -> list[str]:

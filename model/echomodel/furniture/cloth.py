@@ -59,7 +59,8 @@ def pillow(centre: Vector, half: Vector, material: str, role: str = "", turn: Ar
 @dataclass(frozen=True, eq=False)
 class Slumped(Solid):
     """Another solid that leans back (-z) above its foot, which is spread and flat: `lean` metres at the height `tall`;
-    there it sinks `aside`, too, and its corner on that side comes down as far."""
+    there it sinks `aside`, too, and its corner on that side comes down as far. Its sides are bent forward, by `bend`
+    metres a metre from its middle, squared."""
 
     soft = draped = True
 
@@ -67,12 +68,13 @@ class Slumped(Solid):
     tall: float = 1.0
     lean: float = 0.0
     aside: float = 0.0
+    bend: float = 0.0
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         vertices, faces = self.of.mesh(detail)
         x, y, z = vertices.T
         high = (np.hypot(np.clip(y / self.tall, 0, 1), FLAT) - FLAT) / (np.hypot(1, FLAT) - FLAT)
-        back = self.lean * (np.clip(high - FOOT, 0, 1) / (1 - FOOT) - 0.5)
+        back = self.lean * (np.clip(high - FOOT, 0, 1) / (1 - FOOT) - 0.5) - self.bend * x * x
         down = np.abs(self.aside) * high**2 * (0.5 + np.sign(self.aside) * x / self.tall)
         return np.stack(
             [x + self.aside * (high**2 - 0.5), self.tall * high - down, z * (1 + SPREAD * (1 - high) ** 2) - back], 1

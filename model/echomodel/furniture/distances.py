@@ -58,8 +58,7 @@ def _from_block(solid: Block, x: Array, y: Array, z: Array, metric: Array) -> Ar
     inside = np.maximum(np.maximum((q[0] - r) / per_axis[0], (q[1] - r) / per_axis[1]), (q[2] - r) / per_axis[2])
     k = [np.maximum(c, 0) for c in q]
     length = np.sqrt(k[0] * k[0] + k[1] * k[1] + k[2] * k[2])
-    outside = (length - r) * length / gradient_length(metric, *k)
-    return np.where(length > 1e-9, outside, inside)
+    return np.where(length > 1e-9, (length - r) * length / gradient_length(metric, *k), inside)
 
 
 @local_distance.register
@@ -137,8 +136,7 @@ def _from_shell(solid: Shell, x: Array, y: Array, z: Array, metric: Array) -> Ar
         gx, gz = (u / q) ** (p - 1) / a, (v / q) ** (p - 1) / b
         walls.append(sign * (q - 1) / gradient_length(metric, np.sign(x) * gx, 0 * gx, -gz))
     top = solid._top(np.arctan2(x / solid.half[0], behind / solid.half[1]))
-    upright_part = np.maximum(y - top, -y) / scale[1]
-    return intersection(intersection(np.maximum(*walls), z / scale[2]), upright_part)
+    return intersection(intersection(np.maximum(*walls), z / scale[2]), np.maximum(y - top, -y) / scale[1])
 
 
 @local_distance.register
@@ -188,8 +186,7 @@ def _from_blade(solid: Blade, x: Array, y: Array, z: Array, metric: Array) -> Ar
 
 @inradius.register
 def _in_ball(solid: Block | Ball, scale: Array) -> float:
-    local = solid.turn * np.asarray(scale)[:, None]
-    return float(min(solid.half / np.linalg.norm(local, axis=0)))
+    return float(min(solid.half / np.linalg.norm(solid.turn * np.asarray(scale)[:, None], axis=0)))
 
 
 @inradius.register
@@ -216,8 +213,7 @@ def _in_lathe(solid: Lathe, scale: Array) -> float:
     outline = solid._outline()
     after = np.roll(outline, -1, axis=0)
     area = 0.5 * abs(np.sum(outline[:, 0] * after[:, 1] - after[:, 0] * outline[:, 1]))
-    length = np.linalg.norm(outline - np.roll(outline, -1, axis=0), axis=1).sum()
-    return float(area / length / scale[0])
+    return float(area / np.linalg.norm(outline - np.roll(outline, -1, axis=0), axis=1).sum() / scale[0])
 
 
 @inradius.register

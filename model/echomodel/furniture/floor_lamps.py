@@ -58,8 +58,7 @@ def wall_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
         r = min(w * 0.22, d * 0.4)
         bar = tube([[-w / 2 + r, h * 0.3, d / 2 - r], [w / 2 - r, h * 0.3, d / 2 - r]], 0.01, "metal")
         arm = tube([[0, h * 0.4, -d / 2 + 0.01], [0, h * 0.3, d / 2 - r]], 0.01, "metal")
-        glow = shade(kind_of(style), w / 2 - r, h * 0.3, d / 2 - r, r, r, h * 0.7, style)
-        return [plate, bar, arm, *both(*glow)]
+        return [plate, bar, arm, *both(*shade(kind_of(style), w / 2 - r, h * 0.3, d / 2 - r, r, r, h * 0.7, style))]
     if choices.chance("form", 0.3):
         body = turned((0, 0, d * 0.1), (w / 2, d * 0.4), h, material="shade")
         return [body, box((-w * 0.2, h * 0.2, -d / 2), (w * 0.2, h * 0.8, d * 0.1), "metal")]

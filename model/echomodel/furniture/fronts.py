@@ -234,8 +234,7 @@ def hutch(w: float, low: float, high: float, z0: float, z1: float, columns: int,
 
 
 def foot_height(style: Style, h: float, most: float = 0.3) -> float:
-    low = {"plinth": 0.05, "bun": 0.06}.get(style.legs, style.leg_height)
-    return float(min(low, most * h))
+    return float(min({"plinth": 0.05, "bun": 0.06}.get(style.legs, style.leg_height), most * h))
 
 
 def fronted(size: Size, style: Style, foot: float, rows: int, columns: int, kind: str) -> list[Solid]:

@@ -45,8 +45,7 @@ def wardrobe(size: Size, style: Style, choices: Choices) -> list[Solid]:
     choice = choices.pick("kind", ["doors", "drawers", "sliding", "open"], [0.45, 0.25, 0.15, 0.15])
     if choice == "sliding" and w > 1.2:
         count = 2 if w < 2.0 else 3
-        material = "mirror" if choices.chance("second", 0.3) else "accent"
-        return parts + sliding((x0, y0), (x1, y1), z, count, material)
+        return parts + sliding((x0, y0), (x1, y1), z, count, "mirror" if choices.chance("second", 0.3) else "accent")
     if choice == "drawers":
         split = y0 + (y1 - y0) * choices.between("split", 0.2, 0.32)
         rows = choices.whole("rows", 1, 3)

@@ -132,8 +132,7 @@ def picture(room: RoomBoxes, seed: int) -> np.ndarray:
     light = _shaded(normals[face], to_camera.astype(float))
     out = np.ones((side * side, 3))
     out[met] = (light[:, None] * colours[face]) ** (1 / 2.2)
-    mixed = out.clip(0, 1).reshape(SIDE, FINER, SIDE, FINER, 3).mean((1, 3))
-    return np.round(mixed * 255).astype(np.uint8)
+    return np.round(out.clip(0, 1).reshape(SIDE, FINER, SIDE, FINER, 3).mean((1, 3)) * 255).astype(np.uint8)
 
 
 @cache

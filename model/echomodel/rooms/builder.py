@@ -219,8 +219,7 @@ class Builder:
         """Gap between a back and its wall: a few centimetres, as such furniture of real rooms has."""
         low, middle, high = back_gaps(category)
         z = self.rng.normal()
-        gap = middle + z * ((high - middle) if z > 0 else (middle - low)) / QUARTILE
-        return min(max(gap, SUNK), FAR_BACK)
+        return min(max(middle + z * ((high - middle) if z > 0 else (middle - low)) / QUARTILE, SUNK), FAR_BACK)
 
     def somewhere(self, category: str, size: Size, style: int, clearance: float = 0.1) -> Item | None:
         """Place one item on open floor."""

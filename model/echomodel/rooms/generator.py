@@ -23,8 +23,7 @@ LARGEST = 80.0  # square metres
 
 def drawn_shares() -> dict[str, float]:
     """Room type -> its share in a mixed set of rooms, the most frequent first, as in real collections."""
-    rows = sorted(vocabulary().room_types, key=lambda row: -row.share)
-    return {row.name: row.share for row in rows if row.share}
+    return {row.name: row.share for row in sorted(vocabulary().room_types, key=lambda row: -row.share) if row.share}
 
 
 def generate_room(

@@ -115,5 +115,4 @@ def _blocks(boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None, above: floa
         return np.array([])
     size, position, yaw = map(np.asarray, boxes)
     low = position[:, 1] < USUAL["door"]["height"] - 0.05
-    there = low & (position[:, 1] + size[:, 1] > above)
-    return np.asarray(shapely.polygons(footprints(size, position, yaw)[there]))
+    return np.asarray(shapely.polygons(footprints(size, position, yaw)[low & (position[:, 1] + size[:, 1] > above)]))

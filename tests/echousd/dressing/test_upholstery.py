@@ -11,7 +11,7 @@ from echomodel.dressing.textiles import LEAN
 from echomodel.triangles import joined
 from echousd import generate
 from echousd.dressing.dress import dressed
-from echousd.dressing.seats import at_back, over_arm, standing_on
+from echousd.dressing.seats import at_back, behind, over_arm, standing_on
 from echousd.dressing.setting import ORIGIN, geometry_of, standing
 from echousd.dressing.soft_tops import STEP, Seat, heights_of, let_down
 from echousd.graph import SceneGraph
@@ -94,6 +94,30 @@ def test_corners_of_a_cushion_that_leans_reach_into_no_curved_back(variant):
     assert spot[1] == pytest.approx(0.42)
     stood = body @ upright(-0.1) + spot + (0.0, 0.002, 0.0)
     assert depth(forbidden_moves([stood], [floor, *backs], 0.1), np.zeros(2)) < 0.001
+
+
+@pytest.mark.parametrize("lean", [0.0, 0.3])
+@pytest.mark.parametrize("turn", [0.0, 0.2])
+def test_a_cushion_finds_how_a_back_leans_and_bends(lean, turn):
+    """A flat back, and two that meet in a corner as the walls of a tub do."""
+    size, foot = np.array([0.44, 0.42, 0.17]), np.array([0.0, 0.42, 0.0])
+    wall = np.array([(x, y, z) for x in (-0.35, 0.35) for y in (0.0, 1.0) for z in (-0.5, -0.25)])
+    wall[:, 2] -= lean * (wall[:, 1] - 0.42)
+    aside, back, bend = behind(seat_of(wall), foot, turn, size)
+    assert aside == pytest.approx(np.tan(turn), abs=0.01)
+    assert back == pytest.approx(lean / np.cos(turn), abs=0.01)
+    assert abs(bend) < 0.01
+    walls = [wall @ upright(side) for side in (-0.5, 0.5)]
+    assert behind(seat_of(*walls), foot, 0.0, size)[2] > 0.03
+
+
+@pytest.mark.parametrize("variant", range(4))
+def test_a_bent_cushion_reaches_forward_at_its_sides(variant):
+    made = [geometry_of("cushion", (0.44, 0.42, 0.17 + bend), variant, (0.04, bend)) for bend in (0.0, 0.06)]
+    straight, bent = (each.parts[0].mesh.vertices for each in made)
+    sides, middle = np.abs(straight[:, 0]) > 0.17, np.abs(straight[:, 0]) < 0.05
+    ahead = (bent - straight)[:, 2]
+    assert ahead[sides].mean() - ahead[middle].mean() == pytest.approx(0.06, abs=0.015)
 
 
 @pytest.mark.parametrize("seed", [106, 108])
