@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -84,9 +84,12 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
     named, bindings = room_slots(room, made, built, slots)
     shown = looks.alternatives(harmony, room.graph.room.style)
     tables = {word: {name: looks.look(word, *of) for name, of in named.items()} for word in shown}
-    with ThreadPoolExecutor(2) as pool:  # what bakes them lets go of Python's lock; equal images are one file
-        for images in pool.map(lambda look: materials.look_images(look, harmony), tables[harmony].values()):
-            files |= dict(images.values())
+    of_looks = [partial(materials.look_images, look, harmony) for look in tables[harmony].values()]
+    with ThreadPoolExecutor(1) as beside:  # what bakes them lets go of Python's lock
+        others = beside.map(partial.__call__, of_looks[::2])
+        images = [one() for one in of_looks[1::2]]
+    for found in (*images, *others):  # equal images are one file
+        files |= dict(found.values())
     files |= lights.image_files(room)
     layers = {
         "geometry": geometry_layer(room),
