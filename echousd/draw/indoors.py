@@ -42,6 +42,7 @@ CONTRAST, KNEE = 1.5, 0.6  # power about what is bright, and from where on highl
 HUE, CHROMA = (0.5, 0.8), (1.0, 1.12)
 LUMA = np.array([0.2126, 0.7152, 0.0722], np.float32)
 DAY = 0.5  # radiance of the sky by day
+GREY = 0.5  # how much less coloured light from outside is than what lies there: ceilings over lawns stay white
 BANDS = 64  # heights of the sky whose light is told apart
 # The brightest shade over what white paper is on the average in the room, by night and by day, as eyes see it; the
 # share of its light that is seen at its rim.
@@ -89,6 +90,7 @@ class Lights:
         else:
             rows = (np.arccos(down) / np.pi * len(self.view)).astype(int)
             color = LINEAR.take(self.view[rows, :: max(self.view.shape[1] // BANDS, 1)]).mean(1).T
+            color = color + np.float32(GREY) * (LUMA @ color - color)
         return np.asarray(self.sky * self.tint[:, None] * color, np.float32)
 
     def from_sky(self, way: np.ndarray) -> np.ndarray:

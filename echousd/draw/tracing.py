@@ -449,18 +449,18 @@ def _gathered(world: World, point: np.ndarray, normal: np.ndarray, square: np.nd
     if not world.fine:
         return thrown
     near = np.flatnonzero((full < NEAR) & world.view.inside)
-    onto, albedo = (each.take(near, 1) for each in (way, world.scenery.planes.color.take(face, 1)))
-    at = _before(world, point.take(near, 1), onto, face.take(near), far.take(near))
+    face, far = face.take(near), far.take(near)
+    there, facing = _before(world, point.take(near, 1), way.take(near, 1), (face, far))
     first, second = (square.take(near, 1) * scale % 1 for scale in SCATTERED)
-    light = _fallen(world, *at, first, second) + _gathered(world._replace(fine=False), *at, second[::-1])
-    thrown[:, near] = albedo * light
+    light = _fallen(world, there, facing, first, second)
+    light += _gathered(world._replace(fine=False), there, facing, second[::-1])
+    thrown[:, near] = world.scenery.planes.color.take(face, 1) * light
     return slanted(thrown, way, normal)
 
 
-def _before(
-    world: World, origin: np.ndarray, way: np.ndarray, face: np.ndarray, far: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Points (3, n) just before faces that rays met, and these' normals towards where they came from."""
+def _before(world: World, origin: np.ndarray, way: np.ndarray, hit: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
+    """Points (3, n) just before what rays `hit`, face and metres, and normals towards where these came from."""
+    face, far = hit
     normal = world.scenery.planes.normal[:3].take(face, 1)
     normal *= -np.sign(along(normal, way))
     return origin + far * way + BEFORE * normal, normal
@@ -478,13 +478,11 @@ def _lit(world: World) -> World:
         origin, square = point.take(np.arange(count) % point.shape[1], 1), rng.random((count, 2), np.float32).T
         way = unit(normal.take(np.arange(count) % normal.shape[1], 1) + on_sphere(square))
         if not (met or world.view.inside):
-            origin, way = camera_rays(
-                world, *(square * np.array([[world.size], [world.size / world.view.aspect]], np.float32))
-            )
+            origin, way = camera_rays(world, world.size * square[0], world.size / world.view.aspect * square[1])
         face, far, _ = first_hit(world, origin, way)
         there = np.flatnonzero(face >= 0)
         origin, way, face, far = (each.take(there, -1) for each in (origin, way, face, far))
-        point, normal = _before(world, origin, way, face, far)
+        point, normal = _before(world, origin, way, (face, far))
         rows = world.thrown.rows(origin, way, far, world.scenery.planes.axis[face])
         met.append((point, normal, rows, world.scenery.planes.color.take(face, 1)))
         if not len(there):
