@@ -19,7 +19,7 @@ from echousd.shapes.geometry import Origin
 from echousd.shapes.joinery import assembled
 
 EYE = 1.52  # metres, height of a picture's middle on an empty wall
-OVER, LOWEST = 0.2, 1.15  # metres between furniture and what hangs over it; no mirror hangs lower
+OVER, SCREEN, LOWEST = 0.2, 0.5, 1.15  # metres between furniture, or desks, and what hangs over it; no mirror is lower
 TALLEST, HIGHEST, WIDEST = 1.45, 1.95, 2.2  # metres: what has pictures over it; their middle; all together
 MOST, CROWD = 6, 7  # pictures of one wall, and of a room: there are none in groups beyond
 NARROWER = (1.0, 0.85, 0.7, 0.55)  # shares of its wished width that what hangs may have
@@ -155,7 +155,7 @@ def pictures(setting: Setting) -> None:
         wall, along = behind(host.size, host.position, host.yaw, every) or (None, 0.0)
         if wall is None or host.top > TALLEST:
             continue
-        rng, least = setting.rng(host.name, "picture"), host.top + OVER
+        rng, least = setting.rng(host.name, "picture"), host.top + (SCREEN if host.row.top == "desk" else OVER)
         kind, one = mirror_over(host, rng), None
         if kind:
             size, variant = usual(kind, rng)
@@ -256,7 +256,7 @@ def meets(opening: Opening, along: float, half: float, low: float, high: float) 
 
 
 # Metres of free wall on which something hangs, alone on its wall or beside something else; more is two.
-STRETCH, SECOND, HALL = 0.9, 1.1, 4.4
+STRETCH, SECOND, HALL = 0.8, 0.95, 4.4
 LEVELS, BESIDE = (1.05, 2.0), 0.1  # metres: heights between which a wall must be free, and air to what is not
 
 
