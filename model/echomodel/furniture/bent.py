@@ -41,22 +41,24 @@ class Shell(Solid):
     front: float = 0.6
     power: float = 2.5
     ease: float = 3.0
-    RINGS = (9, 13, 21, 33)  # by detail
+    RINGS = (9, 15, 23, 35)  # by detail
 
     def _top(self, angle: Array) -> Array:
         return self.back + (self.front - self.back) * np.clip(np.abs(angle) / (np.pi / 2), 0, 1) ** self.ease
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
-        angle = np.linspace(-np.pi / 2, np.pi / 2, self.RINGS[detail])
+        angle = np.linspace(-np.pi / 2, np.pi / 2, self.RINGS[detail] - 2)
         s, c = np.sin(angle), np.cos(angle)
         norm = (np.abs(s) ** self.power + np.abs(c) ** self.power) ** (1 / self.power)
-        top, rings = self._top(angle), []
+        top, rings, back = self._top(angle), [], np.array([0, 0, 0.3 * self.thickness])
         turn = np.linspace(0, np.pi, (2, 4, 5, 6)[detail])  # over the wall's top, which is as round as it is thick
         across, down = np.array([1, 0, *(1 - np.cos(turn)) / 2]), self.thickness / 2 * (1 - np.sin(turn)) * (detail > 0)
         for sine, cosine, length, high in zip(s, c, norm, top, strict=True):
             wall = (np.array(self.half) - across[:, None] * self.thickness) * (sine, -cosine) / length
             rings.append(np.insert(wall, 1, [0, 0, *(high - down)], axis=1))
-        return loft(rings)
+        ends = np.array([rings[0], rings[-1]])  # which are round
+        first, last = (middle := ends.mean(1, keepdims=True)) + 0.7 * (ends - middle)
+        return loft([first, rings[0] - back, *rings[1:-1], rings[-1] - back, last])
 
     def runs(self, vertices: Array) -> list[Array]:
         count = next(n for n in self.RINGS if (len(vertices) - 2) % n == 0)

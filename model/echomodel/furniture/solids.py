@@ -154,7 +154,7 @@ class Ball(Solid):
     power: float = 2.0
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
-        vertices, faces = cube_surface((2, 4, 6, 8)[detail] if self.half.max() > 0.04 else 2 + detail)
+        vertices, faces = cube_surface(max(2, _corners(detail, float(self.half.max())) // 4))
         vertices = np.tan(vertices * np.pi / 4)
         length = (np.abs(vertices) ** self.power).sum(1, keepdims=True) ** (1 / self.power)
         return vertices / length * self.half, faces
@@ -283,8 +283,7 @@ class Lathe(Solid):
     hollow: bool = False
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
-        largest = float(self.profile[:, 0].max())
-        corners = ((8, 12, 20, 32) if largest > 0.05 else (6, 8, 10, 14))[detail]
+        corners = _corners(detail, float(self.profile[:, 0].max()))
         circle = superellipse(2.0, corners) * [1.0, self.squash]
         rings = at_levels(circle * np.maximum(self.profile[:, :1, None], 1e-4), self.profile[:, 1])
         if not self.hollow:

@@ -339,8 +339,7 @@ class _Planner:
         plan = np.array([wall.point((span[0] + span[1]) / 2, BEHIND + deep / 2)
                          for wall, (_, _, span, _), deep in zip(walls, every, size[:, 2], strict=True)])  # fmt: skip
         position = np.stack([plan[:, 0], [row[3] for row in every], plan[:, 1]], 1)
-        missing = len(self.hung) - len(over)
-        return Run(which, size, position, np.array([wall.yaw for wall in walls]), cost + missing)
+        return Run(which, size, position, np.array([wall.yaw for wall in walls]), cost + len(self.hung) - len(over))
 
     def _hood(self, i: int, span: Interval) -> Interval:
         half = (span[1] - span[0]) / 2 if self.free[i] else float(self.size[i, 0]) / 2
