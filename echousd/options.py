@@ -121,7 +121,7 @@ class RoomOptions(PlainModel, Look):
         None, ROOM, "who lives there, told by small things; else as the furniture suggests", everyday=True, flag="for",
         words="|".join(RESIDENTS),
     )  # fmt: skip
-    openings: Literal["kept", "drawn"] = row("kept", ROOM, "doors and windows of the graph, or new ones by the seed")
+    openings: Literal["kept", "doors", "drawn"] = row("kept", ROOM, "the graph's, its doors alone, or new by the seed")
     settle: bool = row(False, ROOM, "simulate the room, put everything where it rests (extra: sim)")
     assets: File | None = row(None, MODELS, "index of a library of models", everyday=True)
     stretch: float = row(STRETCH, MODELS, "how much models may be stretched", ge=1, le=4)

@@ -17,6 +17,7 @@ LARGEST = 10_000.0  # m² of the box around a floor; what is rasterized on it ta
 SLIDING = 0.08  # share of rooms without a style whose door slides, where there is room for it
 FRENCH, TALL = 0.15, 0.15  # likewise, whose windows reach down to the floor, or nearly
 LOW = 0.3  # metres, sill of tall windows
+OUTER = 0.15  # metres: thicker walls have the outside behind them
 CROWDED = 0.62  # share of the floor, from which on a person is told
 Arrays = tuple[np.ndarray, np.ndarray, np.ndarray]
 
@@ -79,14 +80,15 @@ def with_placed_openings(graph: SceneGraph, boxes: Arrays, seed: int) -> SceneGr
     from echomodel.rooms.openings import place_openings
 
     corners = graph.room.corners
-    if corners is None or graph.room.walls or any(opening.kind == "window" for opening in graph.room.openings):
+    if corners is None or any(opening.kind == "window" for opening in graph.room.openings):
         return graph
     words = vocabulary()
     fitted = any(words.category(node.category).stands == "row" for node in graph.nodes)
     use = "wet" if fitted else words.room_type(graph.room.type).use
+    outer = [(edge, 0.0, np.inf) for edge, thick in enumerate(graph.room.walls) if thick > OUTER]
     placed = place_openings(
         corners, graph.room.tall, _generator(seed, "openings"), boxes=boxes, stated=graph.room.openings,
-        use=use if use in WINDOWS else "",
+        use=use if use in WINDOWS else "", spans=outer if graph.room.walls else None,
     )  # fmt: skip
     share = style.sliding if (style := words.known_style(graph.room.style)) else SLIDING
     if not use and not len(boxes[0]) and _generator(seed, "sliding").random() < share:

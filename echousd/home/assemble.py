@@ -87,7 +87,7 @@ def jobs_of(plan: HomePlan, output: Path, options: RoomOptions, outside: Sequenc
     jobs = {}
     for each in plan.home.rooms:
         seed = (options.seed + zlib.crc32(each.name.encode())) % MAX_SEED
-        asked = BatchOptions(**{**fields, "seed": seed})
+        asked = BatchOptions(**{**fields, "seed": seed, "openings": "doors" if each.name in plan.lit else "kept"})
         folder = str(output / FOLDER / each.name)
         jobs[each.name] = Job(each.name, folder, seed, asked, plan.graph(each.name).to_json(), outside=tuple(outside))
     return jobs
@@ -133,6 +133,8 @@ def write_rooms(
             done[name] = value
             failed |= {name: error} if error else {}
             tell(sum(value is not None for value in done.values()) + len(failed), len(wanted))
+        plan = furnished_plan(plan, output)
+        digests = digests_of(jobs_of(plan, output, options, outside))
         marks = {name: digest for name, digest in digests.items() if name not in failed}
         if marks:
             write_all(files := home_files(plan, output, marks, options, number))
@@ -141,6 +143,13 @@ def write_rooms(
                 if undone.stem.isdecimal() and int(undone.stem) > int(now.stem):
                     undone.unlink()
         return Made(root, done, failed)
+
+
+def furnished_plan(plan: HomePlan, output: Path) -> HomePlan:
+    """The plan with the windows that rooms were given where their furniture leaves the walls free."""
+    found = {name: find_manifest(output / FOLDER / name) for name in plan.lit}
+    there = {name: SceneGraph.from_json(json.dumps(own["graph"])).room.openings for name, own in found.items() if own}
+    return replace(plan, openings={**plan.openings, **there}, lit=plan.lit - there.keys())
 
 
 def _edited(folder: Path) -> bool:

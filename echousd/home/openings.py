@@ -7,20 +7,11 @@ from functools import cached_property
 import numpy as np
 import shapely
 
-from echomodel.openings import (
-    WINDOWS,
-    Opening,
-    direction,
-    edge_lengths,
-    free_area,
-    inward_normal,
-    numbered,
-    overlap,
-    signed_area,
-)
-from echomodel.rooms.openings import PIER
+from echomodel.openings import Opening, direction, edge_lengths, free_area, inward_normal, overlap, signed_area
+from echomodel.rooms.openings import place_openings, places_along
 from echomodel.vocabulary import vocabulary
 from echousd.home.graph import HomeGraph, HomeRelation
+from echousd.naming import free_name
 
 DOOR, FRONT_DOOR = (0.9, 2.0), (1.0, 2.1)  # metres, width and height
 PASSAGE = (3.0, 2.3)  # at most
@@ -28,6 +19,7 @@ PASSAGE_SHARE = 0.6  # of the wall that two rooms share: furniture needs the res
 JAMB = 0.12  # metres from a corner to a hole
 UNEVEN = 0.15  # metres that a wall may be thicker in one place than in another
 STEP = 0.1  # metres between the places that are tried
+ASIDE = 0.25  # what a metre between a hole and the nearest corner or other hole costs
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,14 +105,14 @@ def openings_of(
     for _ in range(2):  # the second time, each knows where all the others are
         for number in order:
             others = [*fixed, *(hole for which, hole in picked.items() if which != number)]
-            costs = [hole.cost + sum(map(hole.meets, others)) for hole in options[number]]
+            costs = [hole.cost + ASIDE * hole.aside(others) + sum(map(hole.meets, others)) for hole in options[number]]
             if costs:
                 picked[number] = options[number][int(np.argmin(costs))]
     found = {floor.name: list(there.get(floor.name, ())) for floor in floors}
     for number in sorted(picked):
         for floor, opening in picked[number].sides:
             own = found[floor.name]
-            own.append(replace(opening, name=numbered(opening.kind, [one.name for one in own])))
+            own.append(replace(opening, name=free_name(opening.kind, [one.name for one in own])))
     for floor in floors:
         found[floor.name] += () if there.get(floor.name) else _windows(home, floor, floors, found[floor.name])
     return {name: tuple(own) for name, own in found.items()}
@@ -138,6 +130,16 @@ class _Hole:
         """What must stay free on each of its sides."""
         return [shapely.Polygon(free_area(floor.corners, opening)) for floor, opening in self.sides]
 
+    def aside(self, others: Sequence["_Hole"]) -> float:
+        """Metres of wall from it to the nearest corner or other hole, in both rooms: furniture needs whole walls."""
+        out = 0.0
+        for floor, mine in self.sides:
+            there = [one for hole in others for same, one in hole.sides if same is floor and one.edge == mine.edge]
+            low = max([0.0, *(one.end for one in there if one.offset < mine.offset)])
+            high = min([float(edge_lengths(floor.corners)[mine.edge]), *(o.offset for o in there if o.end > mine.end)])
+            out += max(min(mine.offset - low, high - mine.end), 0.0)
+        return out
+
     def meets(self, other: "_Hole") -> float:
         """What speaks against two holes together: swings that cross, holes in one place."""
         out = 0.0
@@ -150,56 +152,36 @@ class _Hole:
         return out
 
 
-def _places(low: float, high: float, width: float) -> np.ndarray:
-    """Offsets of a hole in a stretch of wall, both ends and the middle among them."""
-    first, last = low + JAMB, high - JAMB - width
-    if last < first - 1e-6:
-        return np.zeros(0)
-    return np.unique(np.round([*np.arange(first, last, STEP), last, (first + last) / 2], 3))
-
-
 def _passages(home: HomeGraph, floors: dict[str, Floor], one: str, other: str, predicate: str) -> Iterator[_Hole]:
     """All holes that a relation could be kept by."""
-    for facing in facings(floors[one], floors[other]):
-        if predicate == "open_to":
-            span = facing.high - facing.low - 2 * JAMB
-            width = min(span, PASSAGE[0], max(PASSAGE_SHARE * span, DOOR[0] + JAMB))
-            ends = (facing.low + JAMB, facing.high - JAMB - width)  # which leaves one whole wall beside it
-            for offset in ends if width > 0.8 else ():
-                mine = Opening("passage", "passage", facing.edge, round(offset, 3), round(width, 3), PASSAGE[1])
-                yield _Hole(((floors[one], mine), (floors[other], facing.across(mine))), -width)
-            continue
-        for into in facings(floors[one], floors[other]), facings(floors[other], floors[one]):
-            for side in into:
-                if {side.edge, side.other_edge} == {facing.edge, facing.other_edge}:
-                    yield from _leaves(home, floors, side)
-
-
-def _leaves(home: HomeGraph, floors: dict[str, Floor], side: Facing) -> Iterator[_Hole]:
-    """Doors in a stretch of wall whose leaf opens into the first of its rooms."""
-    floor = floors[side.one]
-    hub = vocabulary().room_type(home.room(side.one).type).hub
-    room = shapely.Polygon(floor.corners).buffer(1e-3)
-    for mine, corner in _doors(floor, side, *DOOR):
-        outside = shapely.Polygon(free_area(floor.corners, mine)).difference(room).area
-        cost = 0.3 * hub + 0.25 * corner + 50.0 * outside
-        yield _Hole(((floor, mine), (floors[side.other], side.across(mine))), cost)
+    for facing in facings(floors[one], floors[other]) if predicate == "open_to" else ():
+        span = facing.high - facing.low - 2 * JAMB
+        width = min(span, PASSAGE[0], max(PASSAGE_SHARE * span, DOOR[0] + JAMB))
+        ends = (facing.low + JAMB, facing.high - JAMB - width)  # which leaves one whole wall beside it
+        for offset in ends if width > 0.8 else ():
+            mine = Opening("passage", "passage", facing.edge, round(offset, 3), round(width, 3), PASSAGE[1])
+            yield _Hole(((floors[one], mine), (floors[other], facing.across(mine))), -width)
+    for near, far in ((one, other), (other, one)) if predicate != "open_to" else ():  # into the first of which it opens
+        floor, hub = floors[near], vocabulary().room_type(home.room(near).type).hub
+        room = shapely.Polygon(floor.corners).buffer(1e-3)
+        for side, mine in ((one, door) for one in facings(floor, floors[far]) for door in _doors(floor, one, *DOOR)):
+            outside = shapely.Polygon(free_area(floor.corners, mine)).difference(room).area
+            yield _Hole(((floor, mine), (floors[far], side.across(mine))), 0.3 * hub + 50.0 * outside)
 
 
 def _front_doors(floor: Floor, floors: Sequence[Floor]) -> Iterator[_Hole]:
     for side in outer_spans(floor, floors):
-        length = float(edge_lengths(floor.corners)[side.edge])
-        for door, corner in _doors(floor, side, *FRONT_DOOR):
-            yield _Hole(((floor, door),), 0.1 * corner + 0.05 * length)
+        for door in _doors(floor, side, *FRONT_DOOR):
+            yield _Hole(((floor, door),), 0.05 * float(edge_lengths(floor.corners)[side.edge]))
 
 
-def _doors(floor: Floor, side: Facing, width: float, height: float) -> Iterator[tuple[Opening, float]]:
-    """Doors in a stretch of wall, hinged at the nearer corner, and how far that is, metres."""
+def _doors(floor: Floor, side: Facing, width: float, height: float) -> Iterator[Opening]:
+    """Doors in a stretch of wall, hinged at the nearer corner."""
     length = float(edge_lengths(floor.corners)[side.edge])
-    for offset in _places(side.low, side.high, width):
+    for offset in places_along(side.low + JAMB, side.high - side.low - 2 * JAMB, width, STEP):
         near, far = float(offset), float(length - width - offset)
         hinge = "left" if (near <= far) == (signed_area(floor.corners) > 0) else "right"
-        yield Opening("door", "door", side.edge, near, width, height, hinge=hinge), min(near, far)
+        yield Opening("door", "door", side.edge, near, width, height, hinge=hinge)
 
 
 def outer_spans(floor: Floor, floors: Sequence[Floor]) -> Iterator[Facing]:
@@ -214,27 +196,11 @@ def outer_spans(floor: Floor, floors: Sequence[Floor]) -> Iterator[Facing]:
             at = max(at, high)
 
 
-def _windows(home: HomeGraph, floor: Floor, floors: Sequence[Floor], there: Sequence[Opening]) -> Iterator[Opening]:
-    """A window, two in a large room, in the middle of the longest outer walls, or at an end if a screen is watched."""
-    row = vocabulary().room_type(home.room(floor.name).type)
+def _windows(home: HomeGraph, floor: Floor, floors: Sequence[Floor], there: Sequence[Opening]) -> tuple[Opening, ...]:
+    """Windows in outer walls, where daylight is wanted or water splashed."""
+    row, tall = vocabulary().room_type(home.room(floor.name).type), home.room(floor.name).graph.room.tall
     if row.use == "outdoor" or not (row.daylight or row.use == "wet"):
-        return
-    sill, tall, wide = WINDOWS[row.use]
-    kinds = [vocabulary().category(node.category) for node in home.room(floor.name).graph.nodes]
-    watched = any(kind.role == "screen" or kind.stands == "opposite" for kind in kinds)
-    spans = []
-    for side in outer_spans(floor, floors):
-        low, high = side.low, side.high
-        for opening in there:
-            if opening.edge == side.edge:  # the longer side of it
-                left, right = (low, opening.offset - PIER), (opening.end + PIER, high)
-                low, high = max(left, right, key=lambda span: span[1] - span[0])
-        spans.append((high - low, side.edge, low, high))
-    names = [opening.name for opening in there]
-    for count, (span, edge, low, high) in enumerate(sorted(spans, reverse=True)[:2]):
-        width = round(min(0.5 * span, wide), 1)
-        if width < 0.5 or span - width < 2 * PIER or (count and abs(signed_area(floor.corners)) < 14.0):
-            return
-        names.append(numbered("window", names))
-        start = round(low + PIER if watched else (low + high - width) / 2, 3)
-        yield Opening(names[-1], "window", edge, start, width, tall, sill)
+        return ()
+    spans = [(side.edge, side.low, side.high) for side in outer_spans(floor, floors)]
+    made = place_openings(floor.corners, tall, np.random.default_rng(0), stated=there, use=row.use, spans=spans)
+    return tuple(one for one in made[len(there) :] if one.kind == "window")

@@ -45,6 +45,7 @@ class HomePlan:
         cells: (k, 2) float of every room, corners (x, z) in metres of its floor and half of its walls; they meet.
         rects: the cells as the solver has them, from which an edit begins. walls: thickness of each edge's wall.
         openings: of every room, which count the edges of its floor. poses: of rooms whose frame is their own.
+        lit: rooms whose windows nobody stated: they are only proposed until the furniture is there.
     """
 
     home: HomeGraph
@@ -53,6 +54,7 @@ class HomePlan:
     openings: Mapping[str, tuple[Opening, ...]]
     rects: Cells
     poses: Mapping[str, np.ndarray] = field(default_factory=dict)
+    lit: frozenset[str] = frozenset()
 
     def pose(self, name: str) -> np.ndarray:
         """(4, 4) float, a room's own frame to the home's, metres, column vectors."""
@@ -171,15 +173,23 @@ def plan_home(home: HomeGraph, *, seed: int = 0, before: HomePlan | None = None)
         raise GraphError(faults[0])
     first = _problem(home, seed, before)
     for effort, problem in itertools.product(EFFORTS, _attempts(first)):
-        state, lie = solved(problem, effort)
-        if state == "solved":
+        found = [solved(one, effort) for one in _varied(problem)]
+        for _, lie, _ in sorted((one for one in found if one[0] == "solved"), key=lambda one: one[2]):
             plan = _walled(home, lie)
             if home.area and first.free and abs(plan.area / home.area - 1) > 0.02:
-                plan = _walled(home, scaled(problem, lie, home.area / plan.area))
+                plan = _walled(home, scaled(lie, home.area / plan.area))
             plan = with_openings(plan)
             if not plan.broken():
                 return plan
     raise GraphError(_unplannable(first))
+
+
+def _varied(problem: Problem) -> Iterator[Problem]:
+    """The problem, and that of a new plan in other outlines, too, if it is free: the best of these is taken."""
+    yield problem
+    side = float(np.sqrt(np.prod(problem.extents)))
+    for number, ratio in enumerate(RATIOS if problem.free and problem.before is None else ()):
+        yield replace(problem, extents=(side / ratio**0.5, side * ratio**0.5), seed=problem.seed + number)
 
 
 def plans(home: HomeGraph, count: int, seed: int = 0) -> list[HomePlan]:
@@ -421,7 +431,11 @@ def with_openings(plan: HomePlan, before: HomeGraph | None = None) -> HomePlan:
         before: the graph that its openings are of, which stay but for those between rooms that it joins in another way.
     """
     if before is None:
-        return replace(plan, openings=openings_of(plan.home, [*plan.sides.values()], {}, ()))
+        openings = openings_of(plan.home, [*plan.sides.values()], {}, ())
+        whole = shapely.union_all([shapely.Polygon(cell) for cell in plan.cells.values()])
+        plain = whole.area > 0.999 * whole.envelope.area  # then thick walls have the outside behind them all along
+        lit = (name for name, own in openings.items() if plain and any(one.kind == "window" for one in own))
+        return replace(plan, openings=openings, lit=frozenset(lit))
     other = {frozenset(r.pair) for r in {*before.relations} ^ {*plan.home.relations} if r.row.passes}
 
     def stays(name: str, opening: Opening) -> bool:

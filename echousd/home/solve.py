@@ -1,7 +1,7 @@
 """Rectangles for rooms: a constraint solver finds how they lie, then wall lines are moved until the areas are right."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
@@ -76,8 +76,8 @@ class Problem:
         return extents / np.maximum((extents / step).round(), 1)
 
 
-def solved(problem: Problem, effort: float = EFFORTS[-1]) -> tuple[str, Cells]:
-    """`solved`, `impossible` (proven) or `unknown` (not within that effort), and the cells."""
+def solved(problem: Problem, effort: float = EFFORTS[-1]) -> tuple[str, Cells, float]:
+    """`solved`, `impossible` (proven) or `unknown` (not within that effort), the cells, and how far off they are."""
     cp = extra("ortools.sat.python.cp_model", "plans need a constraint solver", "home", GraphError)
     model, sides = _model(cp, problem)
     solver = cp.CpSolver()
@@ -87,19 +87,16 @@ def solved(problem: Problem, effort: float = EFFORTS[-1]) -> tuple[str, Cells]:
     solver.parameters.max_deterministic_time = effort
     status = solver.Solve(model)
     if status not in (cp.OPTIMAL, cp.FEASIBLE):
-        return ("impossible" if status == cp.INFEASIBLE else "unknown"), {}
+        return ("impossible" if status == cp.INFEASIBLE else "unknown"), {}, np.inf
     steps = np.tile(problem.steps, 2)
     lie: Cells = {name: tuple((np.array([*map(solver.Value, own)]) * steps).tolist()) for name, own in sides.items()}
-    return "solved", _tuned(problem, lie)
+    return "solved", *_tuned(problem, lie)
 
 
-def scaled(problem: Problem, lie: Cells, factor: float) -> Cells:
-    """The cells with all areas and the outline that many times as large."""
-    side = float(np.sqrt(factor))
-    wishes = tuple(replace(wish, area=wish.area * factor) for wish in problem.wishes)
-    larger = replace(problem, wishes=wishes, extents=(problem.extents[0] * side, problem.extents[1] * side))
-    grown: Cells = {name: (side * a, side * b, side * c, side * d) for name, (a, b, c, d) in lie.items()}
-    return _tuned(larger, grown)
+def scaled(lie: Cells, factor: float) -> Cells:
+    """The cells with all areas and the outline that many times as large, on wall lines of 5 cm."""
+    side = np.sqrt(factor)
+    return {name: tuple(((np.array(rect) * side / FINE).round() * FINE).tolist()) for name, rect in lie.items()}
 
 
 def _model(cp: Any, problem: Problem) -> tuple[Any, dict[str, tuple[Any, Any, Any, Any]]]:
@@ -200,8 +197,8 @@ def _demands(
         yield [way for other in near for way in _touching(rects[name], other, 1.0, least)]
 
 
-def _tuned(problem: Problem, lie: Cells) -> Cells:
-    """The cells with their wall lines moved, on 5 cm, until areas and proportions are as near as they get."""
+def _tuned(problem: Problem, lie: Cells) -> tuple[Cells, float]:
+    """The cells with their wall lines moved, on 5 cm, until areas and proportions are as near as they get: how near."""
     rects = np.array([*lie.values()])
     line, at, pinned = _lines(problem, rects)
     cost, solved_at = _cost(problem, line, rects), at
@@ -220,8 +217,8 @@ def _tuned(problem: Problem, lie: Cells) -> Cells:
                         break
             if best > before - 1e-9:
                 break
-    at = at if best < cost(solved_at) else solved_at
-    return dict(zip(lie, map(tuple, at[line].round(4).tolist()), strict=True))
+    best, at = min((best, at), (cost(solved_at), solved_at), key=lambda one: one[0])
+    return dict(zip(lie, map(tuple, at[line].round(4).tolist()), strict=True)), best
 
 
 def _lines(problem: Problem, rects: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -77,7 +77,7 @@ def furnished(brief: Brief) -> Room:
     check_sources([source_of(graph.node(name), brief.shapes) for name in wanted], model)
     search = None if model is None else LayoutSearch(
         model, asked.seed, timer, asked.steps, brief.change, asked.drafts or most_drafts(model, len(graph.nodes)),
-        asked.place, proposed=not brief.stated.room.openings,
+        asked.place, graph.room.openings != brief.stated.room.openings, brief.stated.room.openings,
     )  # fmt: skip
 
     def arranged(graph: SceneGraph, number: int, sizes: Mapping[str, Vector]) -> tuple[Boxes, tuple[str, ...]]:
@@ -139,8 +139,8 @@ def with_room_around(graph: SceneGraph, stated: SceneGraph, layouts: Sequence[Bo
     plan = plan_boxes(layouts)
     if stated.room.extents is None:  # unplaced, or by weights that know of no floor, furniture may stand beyond
         graph = with_wider_floor(graph, footprints(*plan).reshape(-1, 2))
-    if not stated.room.openings:
-        graph = with_free_openings(graph, layouts, seed)
+    if graph.room.openings != stated.room.openings or not (graph.room.openings or graph.room.walls):
+        graph = with_free_openings(graph, layouts, seed, stated.room.openings)
     return with_lowered_windows(graph, stated, plan, seed)
 
 

@@ -19,7 +19,7 @@ from echomodel.late import Late
 from echomodel.loading import load_model
 from echomodel.objective.access import LEAF, NEEDED
 from echomodel.objective.physics import TOUCH
-from echomodel.openings import signed_area
+from echomodel.openings import Opening, signed_area
 from echomodel.progress import StageTimer
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
@@ -49,7 +49,10 @@ CROWD = 160  # objects of all drafts together, unless somebody says how many dra
 MAX_OBJECTS = 200  # of one room: up to here time grows no faster than their number, 400 take four times that of 200
 TALL = 2.0  # metres by which a screen counts as higher where openings are placed: it wants no window behind it
 DEFAULTS = PlaceConfig()
-OF_OPENINGS = frozenset({"door_free", "leaf_aside", "window_free", "way_in"})  # terms
+Found = tuple[Boxes, tuple[str, ...]]  # a layout, and what of its demands is in conflict
+Stated = tuple[Opening, ...]
+OF_WINDOWS = frozenset({"window_free"})  # terms
+OF_OPENINGS = OF_WINDOWS | {"door_free", "leaf_aside", "way_in"}
 DRAWN_LATER = 1_000_000  # added to the number of a layout, so that its further drafts are no other layout's
 judged_faults = lru_cache(4 * DRAFTS)(living_faults)  # of boxes that nobody changes: openings that make way ask again
 
@@ -78,7 +81,8 @@ class LayoutSearch:
     change: GraphEdit | None = None  # what was edited in the graph, None = nothing
     drafts: int = 1  # at most
     place: bool = True  # whether drafts are placed by search
-    proposed: bool = False  # nobody stated the openings, which make way for furniture
+    proposed: bool = False  # nobody stated some of the openings, which make way for furniture
+    stated: Stated = ()  # those that stay then
 
     def sampled(self, graph: SceneGraph, number: int, count: int = 1) -> list[Boxes]:
         """So many drafts at once from the layout branch, in the room's frame; what the graph fixes comes back."""
@@ -116,15 +120,16 @@ class LayoutSearch:
 
         `number`: of the layout.
         """
-        best: tuple[Boxes, tuple[str, ...]] | None = None
+        best: Found | None = None
         worth: tuple[float, ...] = ()
         ways, judged = [(graph, DEFAULTS)], 0
         budget = max(POSES, PIECE * len(graph.nodes)) * max(1.0, self.drafts / DRAFTS)
         # what a draft leaves to be wished for, its number, it, and the searches that were begun from it
         left: list[tuple[tuple[float, ...], int, Boxes, dict[bytes, Arranged]]] = []
         if self.proposed and graph.room.openings:  # which make way for the furniture of every other draft
-            bare = graph.with_room(openings=())
-            ways = [(graph, PlaceConfig(yields=OF_OPENINGS)), (bare, DEFAULTS)]
+            bare = graph.with_room(openings=self.stated)
+            yields = OF_WINDOWS if self.stated else OF_OPENINGS
+            ways = [(graph, PlaceConfig(yields=yields)), (bare, DEFAULTS)]
 
         def drawn() -> Iterator[tuple[int, Boxes, dict[bytes, Arranged], int]]:
             for start, count in draft_rounds(self.drafts):
@@ -142,7 +147,7 @@ class LayoutSearch:
                 return found
             judged += poses
             with self.timer.stage("place"), one_thread():
-                wishes = _wishes(graph, found, self.seed if self.proposed else None)
+                wishes = _wishes(graph, found, self.seed if self.proposed else None, self.stated)
             if best is None or wishes < worth:
                 best, worth = found, wishes
             left += [] if anew else [(wishes, rank, draft, begun)]
@@ -170,16 +175,16 @@ def draft_rounds(drafts: int) -> list[tuple[int, int]]:
     return out
 
 
-def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]], seed: int | None) -> tuple[float, ...]:
+def _wishes(graph: SceneGraph, found: Found, seed: int | None, stated: Stated = ()) -> tuple[float, ...]:
     """What a layout leaves to be wished for, the worse first: what is broken or collides, conflicts, rounded faults
     that another layout may not have.
 
-    `seed`: where nobody stated the openings, that by which they make way; None = they stay.
+    `seed`: that by which openings make way which are not among the `stated`; None = they stay.
     """
     boxes, conflicts = found
     faults = judged_faults(graph, boxes)
     if seed is not None and any(fault.rule in OF_OPENINGS for fault in faults):
-        faults = judged_faults(with_free_openings(graph, [boxes], seed), boxes)
+        faults = judged_faults(with_free_openings(graph, [boxes], seed, stated), boxes)
     left = [fault for fault in faults if fault.rule not in OF_GRAPHS]
     return len(layout_outcome(graph, boxes).faults), len(conflicts), round(severity(left), 2)
 
@@ -235,7 +240,7 @@ def _on_cords(graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str]) -> Box
     return boxes if worse else longer
 
 
-def with_free_openings(graph: SceneGraph, layouts: Sequence[Boxes], seed: int) -> SceneGraph:
+def with_free_openings(graph: SceneGraph, layouts: Sequence[Boxes], seed: int, stated: Stated = ()) -> SceneGraph:
     """The graph with openings that nobody stated moved to where nothing stands, if furniture is in their way.
 
     A screen wants no window behind it.
@@ -244,7 +249,7 @@ def with_free_openings(graph: SceneGraph, layouts: Sequence[Boxes], seed: int) -
     def faults(graph: SceneGraph) -> int:
         return sum(len(judged_faults(graph, boxes)) for boxes in layouts)
 
-    bare = graph.with_room(openings=())
+    bare = graph.with_room(openings=stated)
     before = faults(graph)
     if graph.room.openings and (not before or before <= faults(bare)):
         return graph

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from echomodel.boxes import Boxes
 from echomodel.late import Late, lates
+from echomodel.openings import KINDS
 from echomodel.progress import StageListener, StageTimer
 from echousd.graph import SceneGraph, load_graph
 from echousd.graph.arrays import one_thread
@@ -98,7 +99,8 @@ def generate(
         assert isinstance(graph, SceneGraph)
     if asked.resident:
         graph = graph.with_room(resident=asked.resident)
-    graph = anchored(graph.with_room(openings=()) if asked.openings == "drawn" else graph, beside)
+    anew = {"kept": (), "doors": ("window",), "drawn": KINDS}[asked.openings]
+    graph = anchored(graph.with_room(openings=tuple(o for o in graph.room.openings if o.kind not in anew)), beside)
     if file:  # a graph that was read may come from anybody; one in memory is the caller's own
         check_files(graph, beside, outside, file)
     graph = with_own_boxes(with_own_pieces(graph, meshes or {}), boxes)
@@ -111,8 +113,9 @@ def generate(
         check_doors(graph)
         graph, left_out = with_space(graph) if asked.fit == "drop" else (graph, ())
         crowded = check_space(graph)
+    whole = graph.room.walls and asked.openings == "kept"  # a home's plan has all openings of its rooms
     brief = Brief(
-        with_plan(graph, asked.seed), graph, graph.room.type, asked, shapes,
+        graph if whole else with_plan(graph, asked.seed), graph, graph.room.type, asked, shapes,
         Provenance(asked.seed, echo.preset, echo.hash, shapes, file), wishes, echo, timer, [{}] * asked.layouts,
         notes=(*filter(None, [other]), *crowded, *held, *homeless, *left_out, *unusual(graph)),
     )  # fmt: skip

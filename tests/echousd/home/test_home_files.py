@@ -3,6 +3,7 @@
 import json
 import shutil
 import threading
+from dataclasses import replace
 
 import ezdxf
 import numpy as np
@@ -11,14 +12,18 @@ from homes import QUICK, inline
 from pxr import Sdf, Usd, UsdGeom
 
 import echousd
+from echomodel.openings import KINDS
 from echousd.batches.plan import room_digest
 from echousd.folder.found import room_at
 from echousd.folder.lock import locked
 from echousd.folder.manifest import find_manifest
+from echousd.home.check import check_home
 from echousd.home.existing import plan_there
 from echousd.home.files import load_home
+from echousd.home.plan import plan_home
 from echousd.home.stages import furniture
 from echousd.make.reading import read_room
+from echousd.place.living import living_faults
 
 FLAT = """home: {area: 34}
 rooms:
@@ -97,6 +102,35 @@ def test_a_home_is_whole(made, echousd_command, tmp_path):
     done = echousd_command("check", folder, "--json")
     assert json.loads(done.out)["reached"]["bedroom"] > 0.5
     assert echousd_command("render", folder, "-o", tmp_path / "top.png", "--view", "top", "--size", "32").code == 0
+
+
+def test_windows_go_where_furniture_leaves_the_walls_free_and_told_ones_stay(tmp_path, monkeypatch):
+    inline(monkeypatch)
+    (tmp_path / "flat.yaml").write_text(FLAT.replace("bed: double_bed", "bed: double_bed, tv: tv_stand, w: wardrobe"))
+    plan = plan_home(load_home(tmp_path / "flat.yaml"))
+    assert plan.lit == {"living", "bedroom"}
+    options = {"shapes": "boxes", "dress": "none", "preview": False}
+
+    def made(plan, folder):
+        root = echousd.generate_home(plan, tmp_path / folder, workers=1, **options).root
+        there = plan_there(root)
+        assert not check_home(root).faults
+        for name, own in there.openings.items():
+            assert [one.kind for one in own].count("window") >= 1, name
+            assert own == read_room(root.parent / "rooms" / name / f"{name}.usda").graph.room.openings
+        return there
+
+    def holes(plan, kinds):
+        return {name: [o for o in own if o.kind in kinds] for name, own in plan.openings.items()}
+
+    free, told = made(plan, "free"), made(replace(plan, lit=frozenset()), "told")
+    assert holes(told, KINDS) == holes(plan, KINDS)
+    assert holes(free, ("door", "passage")) == holes(plan, ("door", "passage"))
+    for name in plan.lit:
+        found = living_faults(free.graph(name), read_room(tmp_path / "free" / "rooms" / name / f"{name}.usda").boxes)
+        assert not [fault for fault in found if fault.rule == "window_free"]
+    again = echousd.generate_home(free.home, tmp_path / "free", workers=1, **options)
+    assert set(again.rooms.values()) == {None}  # nothing is made anew
 
 
 def test_floors_meet_in_the_doorway(made):

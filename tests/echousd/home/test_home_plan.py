@@ -8,11 +8,12 @@ import shapely
 from homes import homes
 from hypothesis import assume, given, settings
 
-from echomodel.openings import edge_lengths, segment, signed_area, swing_area
+from echomodel.openings import Opening, edge_lengths, rectangle, segment, signed_area, swing_area
 from echousd.graph import GraphError
 from echousd.home import plan as planning
 from echousd.home.existing import next_plan
 from echousd.home.graph import HomeGraph
+from echousd.home.openings import Floor, _Hole
 from echousd.home.plan import INNER, OUTER, conflicts, plan_home, plans, ways
 from echousd.home.solve import EFFORTS, solved
 from echousd.home.stages import home_layer
@@ -81,11 +82,33 @@ def test_windows_look_outside(flat):
             assert shapely.distance(outer, middle) == pytest.approx(OUTER, abs=1e-3)
 
 
-def test_windows_are_in_the_middle_but_where_a_screen_wants_the_wall(flat):
-    for name, shift in (("bedroom_1", False), ("living", True)):
+def test_windows_are_in_the_middle_until_the_furniture_is_there(flat):
+    assert flat.lit == {"kitchen", "living", "bedroom_1", "bedroom_2", "bathroom"}
+    for name in ("bedroom_1", "living"):
         window = next(opening for opening in flat.openings[name] if opening.kind == "window")
         wall = edge_lengths(flat.floors[name])[window.edge]
-        assert (abs(window.offset + window.width / 2 - wall / 2) > 0.3) == shift, name
+        assert abs(window.offset + window.width / 2 - wall / 2) < 0.3, name
+
+
+def test_a_hole_stands_aside_by_the_nearest_corner_or_hole():
+    floor = Floor("hall", rectangle(8, 4), (INNER / 2,) * 4)
+
+    def hole(offset):
+        return _Hole(((floor, Opening("door", "door", 0, offset, 0.9, 2.0)),), 0.0)
+
+    assert hole(0.12).aside([]) == pytest.approx(0.12)
+    assert hole(3.5).aside([]) == pytest.approx(3.5)
+    assert hole(3.5).aside([hole(2.4), hole(7.0)]) == pytest.approx(0.2)
+
+
+def test_doors_leave_whole_walls_to_the_room_in_the_middle():
+    for seed in range(4):
+        plan = plan_home(
+            HomeGraph.from_words("living door bedroom*3, living door bathroom, living door study"), seed=seed
+        )
+        floor, doors = plan.floors["living"], [one for one in plan.openings["living"] if one.kind != "window"]
+        ends = {0.0, *(end for one in doors for end in (one.offset, one.end)), *edge_lengths(floor).tolist()}
+        assert max(min(abs(one.offset - end) for end in ends - {one.offset}) for one in doors) < 0.8, seed
 
 
 def test_the_same_seed_gives_the_same_plan(flat):
