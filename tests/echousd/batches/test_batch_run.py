@@ -125,7 +125,7 @@ def test_rooms_that_want_further_drafts_are_the_same_whatever_was_ended(tmp_path
     limit = {1: 9.0, 2: 0.3, 3: -9.0}
     monkeypatch.setattr(
         "echousd.make.layouts._wishes",
-        lambda graph, found, proposed: (max(float(found[0].position[0, 0]) - limit[len(graph.nodes)], 0.0),),
+        lambda graph, found, *_: (max(float(found[0].position[0, 0]) - limit[len(graph.nodes)], 0.0),),
     )
     further = []
     sample = layouts.LayoutSearch.sampled

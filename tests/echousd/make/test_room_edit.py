@@ -138,7 +138,7 @@ def test_an_edit_draws_several_layouts_and_keeps_the_best(root, monkeypatch):
     graph = small_graph().add_node("chair", "nightstand").relate("chair", "close_by", "wardrobe")
     seen = []
 
-    def wishes(graph, found, proposed):
+    def wishes(graph, found, *_):
         seen.append(found[0])
         return (0, 0, 1 if len(seen) == 3 else 1 + len(seen))  # no two end alike
 
