@@ -26,11 +26,11 @@ CEILING = np.array([0.87, 0.86, 0.84], np.float32)
 # What is seen through windows is exposed for itself, as photographers of interiors blend it in: how bright by day, the
 # power of the sky's light by which it is less in the evening, and haze before it.
 THERE, DUSK, VEIL = 2.5, 0.5, 0.03
-WHITER = 0.15  # how much less coloured the light of lamps is than told: no wall is as yellow to eyes
+WHITER = 0.25  # how much less coloured the light of lamps is than told: no wall is as yellow to eyes
 DIM = 0.004  # radiance at every place of a room without lamps and windows, so that one sees it
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
 # darker than comes to, by night and by day, and how much at most it is brightened for that.
-ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.58, 0.8), (0.34, 0.53), 70, 40.0
+ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.58, 0.95), (0.34, 0.53), 70, 40.0
 # Power of the light's brightness that eyes take from it, and inside whoever photographs rooms gives it; and what it
 # comes near to over the mean inside, where sun and lamps are blended in from darker exposures: floors keep their look.
 EVEN, LIMIT = (0.18, -0.15), (np.inf, 1.95)
