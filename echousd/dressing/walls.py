@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import islice, product
+from itertools import chain, product
 
 import numpy as np
 
@@ -31,8 +31,8 @@ PLUGGED = ("bed", "desk", "tv_stand")  # words of what has a socket beside it
 CURTAINS = ("curtain", "tied_curtain", "eyelet_curtain", "pleated_curtain", "sheer_curtain")  # of a room all are alike
 BLINDS = ("blind", "roman_blind", "cafe_curtain")  # as well; where it is wet, the first
 HEMS = (0.14, -0.02, -0.2)  # metres below the sill that others end at
-# Of how wide a curtain hangs, where something stands beside it; of a rail, how far in it may hang there.
-BUNCHED, INWARD = (1.0, 0.75, 0.55), 0.2
+# Of how wide curtains hang, where something is beside one; of a rail, how far in both may hang there, less if short.
+BUNCHED, INWARD = (1.0, 0.75, 0.55), (0.0, 0.05, 0.1, 0.15, 0.2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,14 +84,13 @@ def curtains(setting: Setting) -> None:
             full = round(min(0.6, 0.2 + 0.2 * window.width), 3)
             low, high = np.clip((window.offset - beyond, window.end + beyond), 0.02, wall.length - 0.02).tolist()
             feet = (0.015, *(window.sill - off for off in HEMS if window.sill > 0.5))
-            for foot, wide in product(feet, (round(full * share, 3) for share in BUNCHED)):
-                inner = wide / 2 + np.linspace(0.0, INWARD * (high - low), 4)  # where something is beside
-                size = np.array([wide, round(rail - foot + 0.005, 3), 0.085])
-                sides: list[Thing] = []
-                for places in (low + inner, high - inner):
-                    hung = (Thing(kind, size, wall.at(x, before, foot), wall.yaw, "", variant) for x in places)
-                    sides += islice((one for one in hung if setting.clear(one, margin=0.0, floor=False)), 1)
-                if len(sides) == 2:  # one alone looks forgotten
+            down = product(feet[:1], INWARD, BUNCHED)
+            for foot, inward, share in chain(down, product(feet[1:], INWARD[:2], BUNCHED)):
+                size = np.array([round(full * share, 3), round(rail - foot + 0.005, 3), 0.085])
+                inner = size[0] / 2 + inward * (high - low)
+                places = (wall.at(x, before, foot) for x in (low + inner, high - inner))
+                sides = [Thing(kind, size, place, wall.yaw, "", variant) for place in places]
+                if all(setting.clear(one, margin=0.0, floor=False) for one in sides):  # one alone looks forgotten
                     setting.placed += sides
                     setting.curtained.add(window.name)
                     break

@@ -455,6 +455,7 @@ def test_curtains_hang_over_the_pane_where_something_stands_beside_it(beside):
     left = min(hung, key=lambda thing: thing.position[0])
     assert left.footprint.intersection(shelf.footprint).area == 0 or not beside
     assert (left.position[0] > -0.85) == beside
+    assert sum(thing.position[0] for thing in hung) == pytest.approx(0.0)  # alike on both sides
     assert all(thing.position[1] < 0.1 for thing in hung)
 
 
