@@ -6,9 +6,10 @@ from echomodel.dressing import names_of, usual
 from echomodel.dressing.textiles import LEAN
 from echomodel.late import lates
 from echousd.dressing.setting import Setting
-from echousd.dressing.soft_tops import LEVEL, Design, Seat, across, corners_of, let_down, lying, put
+from echousd.dressing.soft_tops import Design, Seat, across, corners_of, let_down, lying, put
 
 cushions_on, over_arm = lates("echousd.dressing.seats", "cushions_on", "over_arm")
+BURIED = 0.6  # share of its height that what lies on a seat may be in the cloth
 WIDE_BED, OVER = 1.3, 0.036  # metres: of a throw's top over a bed, whose cover lies in folds
 DRAPED = {"sofa": 0.9, "seat": 0.4}  # shares of sofas and armchairs with a blanket over an arm
 
@@ -59,8 +60,8 @@ def on_covers(setting: Setting) -> None:
                 x, z = (0.0, 0.0) if at == "pillows" else np.array(at) * host.size[[0, 2]] / 2
                 spot = seat.before_pillows(x, size) if at == "pillows" else np.array([x, seat.level, z])
                 spot = lying(host, seat, spot, turn, size, corners_of(kind, size, variant))
-                if spot is not None and wish.by:  # a seat is fuller than its solids
-                    spot[1] = max(spot[1], (seat.below(spot, size) or 0.0) - LEVEL)
+                if spot is not None and wish.by and (seat.below(spot, size) or 0) - spot[1] > BURIED * size[1]:
+                    spot = None  # a seat is fuller than its solids
                 if put(setting, host, spot, kind, size, turn, variant):
                     break
 

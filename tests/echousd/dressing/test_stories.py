@@ -148,7 +148,7 @@ nodes:
 
 
 def test_what_was_left_on_seats_and_benches_lies_in_sight():
-    """On the cloth, not on the solids a few centimetres below it."""
+    """On the solids, so that it rests, and so thick that the cloth over these does not bury it."""
     setting = dressed(echousd.generate(SceneGraph.from_yaml(LOUNGE), seed=4, dress="full"))
     left = [t for t in setting.placed if t.kind in {kind for wish in setting.story.seats for kind in wish.of}]
     on = {name: [thing for thing in left if thing.on == name] for name in ("sofa", "armchair")}
@@ -159,8 +159,9 @@ def test_what_was_left_on_seats_and_benches_lies_in_sight():
         for thing in things:
             there = np.insert(host.in_plan(thing.position), 1, 0.0)
             cloth = Seat.of(host).below(there, thing.size)
-            assert thing.position[1] - host.position[1] == pytest.approx(cloth, abs=0.02)
-            assert thing.position[1] - host.position[1] > cloth - 0.01
+            over = thing.position[1] - host.position[1] - cloth
+            assert -0.04 < over < 0.005
+            assert over + thing.size[1] > 0.4 * thing.size[1]
     assert any(thing.on == "bench" for thing in setting.placed)
 
 
