@@ -5,6 +5,7 @@ import math
 import os
 import pickle
 import re
+import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -160,7 +161,7 @@ def read_published(path: str | os.PathLike[str]) -> dict[str, Tensor]:
         raise CheckpointError(
             f"{path}: refused, {what}; only tensors, numbers and containers of them are read, nothing is executed"
         ) from None
-    except (RuntimeError, EOFError, ValueError, LookupError, AttributeError, TypeError) as error:
+    except (RuntimeError, EOFError, ValueError, LookupError, AttributeError, TypeError, struct.error) as error:
         reason = str(error).strip().splitlines()[0][:160] if str(error).strip() else type(error).__name__
         raise CheckpointError(f"{path}: truncated, or not a file written by torch.save ({reason})") from None
     if not isinstance(raw, Mapping):

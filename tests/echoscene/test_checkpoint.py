@@ -124,6 +124,15 @@ def test_truncated_files_are_named(model: ReleasedModel, tmp_path: Path, keep: i
         convert(source, tmp_path / "out.safetensors")
 
 
+def test_files_cut_within_a_number_are_named_too(tmp_path: Path) -> None:
+    whole, source = tmp_path / "whole.pth", tmp_path / "cut.pth"
+    torch.save({f"key_{n}": torch.zeros(2) for n in range(300)}, whole, _use_new_zipfile_serialization=False)
+    for keep in range(200, 1400, 3):
+        source.write_bytes(whole.read_bytes()[:keep])
+        with pytest.raises(CheckpointError, match=r"cut\.pth: (truncated|refused)"):
+            convert(source, tmp_path / "out.safetensors")
+
+
 class _Bomb:
     def __init__(self, mark: Path) -> None:
         self.mark = mark
