@@ -38,7 +38,7 @@ def embree(triangles: np.ndarray) -> Any:
 
 class World(NamedTuple):
     """What rays run through: the tree, what is in it, the camera, pixels across, shifts of the first; what light is
-    thrown back, what the sun gives to what faces it, whether folds and weaves show, how much brighter shades are than
+    thrown back, what the sun gives to what faces it, whether the picture is fine, how much brighter shades are than
     told, and the mean light, by colour; and the images as they are seen."""
 
     scene: Any

@@ -24,9 +24,9 @@ PLACES, OFTEN, TURNS = (600, 1200), 3, 5
 # Metres from which on what stands near throws on all of its light, which is in a shadow itself, and of how much it
 # throws on more if it is white; what any surface mirrors of all around it.
 CREVICE, PALE, SHEEN = 1.0, 0.55, 0.05
-# In fine pictures what is met within so many metres throws on what falls just there, of which two places of the unit
-# square are asked that depend on the first only by so much; and so much of the width on either side of an edge is
-# asked more often and smoothed less, as shadows of feet are small.
+# In fine pictures: metres within which what is met throws on what falls just there; factors that make of a place of the
+# unit square others that hardly depend on it, for the rays from there; share of the width on either side of an edge in
+# which light is asked more often and smoothed less, as shadows of feet are small.
 NEAR, SCATTERED, BAND = np.float32(0.5), (np.float32(1021), np.float32(769)), 0.004
 # Gloss from which on surfaces mirror, and are metal, of which so much is not mirrored; how far from where a mirror
 # would a rough one mirrors.
@@ -40,8 +40,8 @@ def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: in
     """The picture as (size / aspect, size, 3) float sRGB in [0, 1].
 
     Pixels at edges send `rays`² rays, others one. Light is asked at every second pixel of every second row, twice
-    `rays` times at edges, (`rays` - 1)² times elsewhere. What asks covers the sun's disc and the sky evenly, each pixel
-    with another shift (randomised quasi-Monte Carlo), so that little noise is left.
+    `rays` times at edges, thrice around them if fine, else (`rays` - 1)² times. What asks covers the sun's disc and the
+    sky evenly, each pixel with another shift (randomised quasi-Monte Carlo), so that little noise is left.
 
     `scenery`: triangles and their colours. `view`: the camera; inside a room its windows and lamps light it, else sun
     and sky from above. `size`: pixels across. `rays`: along each side of a pixel. `seed`: of the shifts; the same seed

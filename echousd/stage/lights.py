@@ -10,7 +10,7 @@ from echousd.stage import values
 MAX_STOPS = 60  # of exposure, either way
 # What our rooms tell of sky, panel and sun: without walls, with walls, which throw back what they get, and below a
 # ceiling, where the sky is seen through the windows alone. The sun is its irradiance: through windows alone a white
-# surface that faces it gains 0.45, about what the sky gives; over walls without a ceiling, which have the sky already,
+# surface that faces it gains 0.6, about what the sky gives; over walls without a ceiling, which have the sky already,
 # so much would leave them blank.
 SHARES = {"open": (1.0, 1.0, 0.55), "walls": (1.4, 0.12, 0.55), "ceiling": (4.8, 0.54, 1.9)}
 
