@@ -33,6 +33,7 @@ PALETTE = {
     "mirror": (196, 214, 222), "book": (150, 90, 78), "stem": (118, 104, 66), "leaf_dark": (58, 104, 64),
     "leaf_silver": (146, 168, 140), "fruit": (201, 134, 46), "petal": (240, 223, 213),
     "blanket_striped": (160, 130, 114), "blanket_checked": (160, 130, 114), "linen_striped": (222, 214, 202),
+    "spines": (150, 90, 78),
 }  # fmt: skip
 
 

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from echomodel.triangles import Mesh, along, area_normals, bounds_of, connected_pieces, lengths
-from echousd.shapes.finishes.slots import UPRIGHT, metres_of
+from echousd.shapes.finishes.slots import SLOTS, UPRIGHT, metres_of
 from echousd.shapes.geometry import CREASE, DRAPED
 
 EDGE = 0.08  # metres from the sides of cloth within which all of it hangs, and from that on to where none does
+# Of a picture of rows: the share of one that is plain, at its head; metres by which boards differ that have others.
+HEAD, ALIKE = 0.02, 1e-4
 UP = (0.0, 1.0, 0.0)  # the normal of triangles without area
 NUDGE = 4e-6  # metres between points of different boards at one place
 ATLAS = 1024, 2  # texels along a side and between charts, of pieces that are unwrapped without overlaps
@@ -132,7 +134,7 @@ def _laid_out(
 
     Along the axis that each face looks at most, divided by the metres that one picture of its slot covers; u runs along
     the longer side of every board (fibres do; bricks lie, however narrow a wall is), and boards begin at different
-    places of the picture. Slots whose picture is of the whole thing get all of it on the side that they show.
+    places of the picture. Boards of slots whose picture is of the whole get all of it, or a row, on the side they show.
 
     `groups`: slots and the faces of each, of one mesh. `owner`, `board`: (f,) int, the numbers of each face's mesh and
     connected piece. `draped`: (f,) bool, whether it is cloth, which where it hangs has its picture from its front.
@@ -149,9 +151,9 @@ def _laid_out(
     away = hung - (one + other) / 2  # the picture of what lies runs on over its edges
     near = np.clip((np.abs(away) - (other - one) / 2) / EDGE + 2, 0, 1) * np.sign(away)
     st[lies] += (near * (other - hung)[..., 1:2])[..., [0, 2]] * (1, -1)
-    rows = np.arange(len(faces))
+    every = np.arange(len(faces))
     across, along = np.array([2, 0, 0])[axis], np.array([1, 2, 1])[axis]
-    turned = extent[rows, along] > 1.05 * extent[rows, across]
+    turned = extent[every, along] > 1.05 * extent[every, across]
     for slot, members in groups:
         turned[members] &= slot not in UPRIGHT
     st[turned] = np.stack([st[turned][..., 1], -st[turned][..., 0]], -1)
@@ -163,12 +165,16 @@ def _laid_out(
         metres = metres_of(slot)
         if metres:
             st[members] /= metres
-        elif len(members):
-            shown = points[faces[members]]
-            first, last = bounds_of(shown)
-            upward = int(np.argmin(last - first) == 1)  # what lies shows its upper side, what hangs its front
-            share = (shown - first) / np.maximum(last - first, 1e-9)
-            st[members] = np.stack([share[..., 0], 1 - share[..., 2] if upward else share[..., 1]], -1)
+            continue
+        own = extent[members, None]
+        x, y, z = np.moveaxis((points[faces[members]] - low[board[members], None]) / np.maximum(own, 1e-9), -1, 0)
+        if (rows := SLOTS[slot].rows) == 1:  # what lies shows its upper side, what hangs its front
+            st[members] = np.stack([x, np.where(own.argmin(2) == 1, 1 - z, y)], -1)
+        else:  # along the longer side of its front; its other sides have what is at the head
+            upright = own[..., 1] > own[..., 0]
+            down = np.where(upright, 1 - y, x) * np.where(axis[members, None] == 2, 1, HEAD)
+            which = np.floor(own.sum(2) / ALIKE) % rows
+            st[members] = np.stack([down, (which + np.where(upright, x, y)) / rows], -1)
     return st.reshape(-1, 2)
 
 

@@ -25,12 +25,14 @@ class MaterialSlot:
     share: float = 0.0
     material: str = ""
     upright: bool = False
+    rows: int = 1
 
 
 HERE = Path(__file__).parent
 _ROWS = {name: MaterialSlot(**row) for name, row in tables("slots.toml", __file__).items()}
 SLOTS: Mapping[str, MaterialSlot] = _ROWS | {
-    name: replace(_ROWS[name.partition("_")[0]], pattern=name, metres=0.0) for name in PRINTS
+    name: replace(_ROWS[name.partition("_")[0]], pattern=name, metres=0.0, rows=row.get("rows", 1))
+    for name, row in PRINTS.items()
 }
 UPRIGHT = frozenset(name for name, slot in SLOTS.items() if slot.upright)
 # What every other style group takes instead.

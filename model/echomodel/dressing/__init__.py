@@ -24,6 +24,7 @@ Row = Mapping[str, Any]  # as `things.toml` says
 # of sheets that show the rows of `prints.toml`: what is printed on pictures and cloths and woven into rugs
 ASPECTS = {
     "tall": 0.74, "wide": 1.45, "rug": 1.5, "round": 1.0, "oval": 1.5, "runner": 3.0, "square": 1.0, "lumbar": 1.7,
+    "spines": 0.46,
 }  # fmt: skip
 TABLE = Path(__file__).with_name("prints.toml")
 PRINTS: Mapping[str, Row] = tables(TABLE.name, __file__)
@@ -66,8 +67,8 @@ def _kinds() -> dict[str, Kind]:
         program = _form(forms) if forms else Late(f"{__name__}.{row.pop('module')}:{name}")
         made[name] = Kind(program=program, low=tuple(row.pop("low")), high=tuple(row.pop("high")), **row)
     for name, row in PRINTS.items():
-        kind = made[BUILT.get(row["form"], name.partition("_")[0])]
-        made[name] = replace(kind, program=partial(kind.program, shown=name))
+        if kind := made.get(BUILT.get(row["form"], name.partition("_")[0])):
+            made[name] = replace(kind, program=partial(kind.program, shown=name))
     return made
 
 

@@ -24,8 +24,6 @@ def book_row(size: Size, rng: np.random.Generator) -> list[Solid]:
         tall, deep = h * rng.uniform(0.78, 1.0), d * rng.uniform(0.8, 1.0)
         parts += _upright(at, thick, tall, deep, d, str(rng.choice(COVERS)))
         at += thick + 0.0008
-    if not parts:
-        parts += _upright(-w / 2, w, h, d, d, COVERS[0])
     return parts
 
 
@@ -45,32 +43,24 @@ def book_size(number: int) -> np.ndarray:
 
 
 def book(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """One book upright, its spine to the front: in paper, between boards, or these with a round back."""
-    (w, h, d), cover, kind = size, str(rng.choice(COVERS)), rng.random()
-    if kind < 0.3:
-        edge, spine = float(rng.uniform(0.0006, 0.0045)), float(rng.uniform(0.0005, 0.004))
-        inner = box((edge - w / 2, 0, -d / 2), (w / 2 - edge, h, d / 2 - edge), "paper")
-        sides = [box((x - edge, 0, -d / 2), (x, h, d / 2), cover) for x in (edge - w / 2, w / 2)]
-        return [*sides, box((-w / 2, 0, d / 2 - 2 * edge), (w / 2, h, d / 2), cover, spine), inner]
-    board, over = rng.uniform((0.0016, 0.002), (0.005, 0.008))
-    if kind < 0.65:
-        return _upright(-w / 2, w, h, d, d, cover, board, over)
-    back = float(rng.uniform(0.003, 0.006))
-    whole = _upright(-w / 2, w, h, d - back, d - 2 * back, cover, board, over)
-    steps = ((0.43, 0.6), (0.3, 1.0))  # half widths and how far before the boards
-    return whole + [box((-x * w, 0, d / 2 - 2 * back), (x * w, h, d / 2 - (1 - out) * back), cover) for x, out in steps]
+    """One book upright, its spine to the front: in paper, or between boards, its back flat or round."""
+    w, h, d = size
+    board, over = rng.uniform((0.0016, 0.002), (0.005, 0.008)) if rng.random() < 0.7 else (0.001, 0.0)
+    back = float(rng.uniform(0.003, 0.006)) if over and rng.random() < 0.5 else 0.0012
+    return _upright(-w / 2, w, h, d, d, str(rng.choice(COVERS)), board, over, back)
 
 
 def _upright(
-    at: float, thick: float, tall: float, deep: float, d: float, cover: str, board: float = COVER, over: float = 0.003
-) -> list[Solid]:
-    """A book between boards that reach `over` metres beyond its pages, spine and boards in one."""
-    front = d / 2
+    at: float, thick: float, tall: float, deep: float, d: float, cover: str, board: float = COVER, over: float = 0.003,
+    back: float = 0.0012,
+) -> list[Solid]:  # fmt: skip
+    """A book between boards that reach `over` metres beyond its pages, its back rounded by `back` metres."""
+    front, spine = d / 2, max(board, 2 * back)
     pages = box((at + board, over, front - deep + over), (at + thick - board, tall - over, front - board), "paper")
     return [
-        box((at, 0, front - deep), (at + board, tall, front), cover),
-        box((at + thick - board, 0, front - deep), (at + thick, tall, front), cover),
-        box((at, 0, front - board), (at + thick, tall, front), cover, 0.0012),
+        box((at, 0, front - deep), (at + board, tall, front - back), cover),
+        box((at + thick - board, 0, front - deep), (at + thick, tall, front - back), cover),
+        box((at, 0, front - spine), (at + thick, tall, front), "spines", back),
         pages,
     ]
 

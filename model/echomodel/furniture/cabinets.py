@@ -177,25 +177,25 @@ def _books(x0: float, x1: float, y0: float, y1: float, z0: float, z1: float, rng
 
     `x0`, `x1`, `y0`, `y1`, `z0`, `z1`: the free space of the cell, metres.
     """
-    x, end = x0, x0 + (x1 - x0) * rng.uniform(0.4, 0.8)
+    x, end = x0, x0 + (x1 - x0) * rng.uniform(0.5, 0.92)
     deep, most = min(0.21, z1 - z0), min(0.92 * (y1 - y0), 0.29)
     if deep < 0.06 or most < 0.08:
         return []
     parts: list[Solid] = []
-    colours, upper = rng.choice(BOOKS, size=3), 0.0
+    upper = 0.0
     while True:
         wide, tall = rng.uniform(0.02, 0.05), most * rng.uniform(0.68, 1.0)
         if x + wide > end:
             break
         near = z0 + deep * rng.uniform(0.75, 1.0)
-        parts.append(box((x, y0, z0), (x + wide - 0.002, y0 + tall, near), str(rng.choice(colours)), 0.0, "book"))
+        parts.append(box((x, y0, z0), (x + wide - 0.002, y0 + tall, near), "spines", 0.0, "book"))
         x, upper = x + wide, tall
     lean, thick = 0.24, 0.026
     tall = min(0.78 * most, upper)
     reach = tall * np.sin(lean) + thick * np.cos(lean)
     if upper and x + reach < x1:  # one leans on the last of the row
         middle = np.array([x + reach / 2, y0 + (tall * np.cos(lean) + thick * np.sin(lean)) / 2, z0 + 0.42 * deep])
-        leaning = box((-thick / 2, -tall / 2, -0.4 * deep), (thick / 2, tall / 2, 0.4 * deep), str(colours[0]))
+        leaning = box((-thick / 2, -tall / 2, -0.4 * deep), (thick / 2, tall / 2, 0.4 * deep), str(rng.choice(BOOKS)))
         parts.append(replace(leaning, centre=middle, turn=rotation(z=lean), role="book"))
         x += reach
     left, height = x + 0.02, y0
@@ -204,7 +204,7 @@ def _books(x0: float, x1: float, y0: float, y1: float, z0: float, z1: float, rng
         if height + thick > y0 + most:
             break
         corner = (left + wide, height + thick, z0 + deep * rng.uniform(0.7, 0.95))
-        parts.append(box((left, height, z0), corner, str(rng.choice(colours)), 0.0, "book"))
+        parts.append(box((left, height, z0), corner, "spines", 0.0, "book"))
         height += thick
     return parts
 

@@ -7,7 +7,7 @@ from echomodel.furniture.cloth import Sheet, cover
 from echomodel.furniture.solids import Tube
 from echomodel.triangles import Mesh
 from echomodel.vocabulary import vocabulary
-from echousd.shapes.finishes.slots import HARMONIES, metres_of
+from echousd.shapes.finishes.slots import HARMONIES, SLOTS, metres_of
 from echousd.shapes.geometry import CREASE, DRAPED
 from echousd.shapes.looks import SHOWN, alternatives, look, palette_for
 from echousd.shapes.sources.whole import BANDS, cut, material_groups
@@ -181,3 +181,22 @@ def _waves(z: float) -> np.ndarray:
     """(4, 33, 3) points of cloth in four deep folds, 0.5 m wide and 1 m high, `z` metres before its middle."""
     turn, y = np.meshgrid(np.linspace(0, 8 * np.pi, 33), np.linspace(0, 1, 4))
     return np.stack([turn / (16 * np.pi), y, 0.08 * np.cos(turn) + z], -1)
+
+
+def test_each_book_has_a_back_of_its_own_that_reads_along_it_and_plain_sides():
+    """Its letters run from its head to its foot where it stands, from left to right where it lies."""
+    sizes = [(0.03, 0.2, 0.15), (0.025, 0.24, 0.16), (0.04, 0.21, 0.15), (0.22, 0.03, 0.15)]
+    rows, found = SLOTS["spines"].rows, []
+    for size in sizes:
+        mesh = box_mesh(size)
+        form = surface(mesh, {"spines": np.arange(len(mesh.faces))})
+        st = form.st[form.st_index].reshape(-1, 3, 2)
+        front = mesh.face_normals[:, 2] > 0.9
+        (down,) = np.flatnonzero(np.array(size) == max(size))
+        ends = mesh.triangles[front][..., down] > 0
+        assert st[front][ends, 0] == pytest.approx(float(down == 0), abs=1e-4)
+        assert st[front][~ends, 0] == pytest.approx(float(down == 1), abs=1e-4)
+        assert st[np.abs(mesh.face_normals[:, 2]) < 0.1, :, 0].max() < 0.03
+        found.append(np.floor(st[front, :, 1].mean() * rows))
+        assert np.ptp(st[front, :, 1]) == pytest.approx(1 / rows, abs=1e-4)
+    assert len(set(found)) > 1
