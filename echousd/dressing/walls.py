@@ -29,8 +29,8 @@ RADIATORS = ("panel_radiator", "panel_radiator", "flat_radiator", "column_radiat
 BELOW, BEHIND = 0.14, 0.03  # metres of air between a window's sill and a radiator, and behind it
 PLUGGED = ("bed", "desk", "tv_stand")  # words of what has a socket beside it
 CURTAINS = ("curtain", "tied_curtain", "eyelet_curtain", "pleated_curtain", "sheer_curtain")  # of a room all are alike
-BLINDS = ("blind", "roman_blind", "cafe_curtain")  # as well; where it is wet, the first
-HEMS = (0.14, -0.02, -0.2)  # metres below the sill that others end at
+BLINDS = ("blind", "roman_blind", "roman_blind")  # as well; where it is wet, the first
+APRON = 0.14  # metres below the sill that others end at
 # Of how wide curtains hang, where something is beside one; of a rail, how far in both may hang there, less if short.
 BUNCHED, INWARD = (1.0, 0.75, 0.55), (0.0, 0.05, 0.1, 0.15, 0.2)
 
@@ -65,8 +65,8 @@ def walls_of(floor: np.ndarray) -> list[Wall]:
 
 
 def curtains(setting: Setting) -> None:
-    """A curtain on either side of every window down to the floor, or to its sill where something stands before it; a
-    blind in it where there is no room for two."""
+    """A curtain on either side of every window down to the floor, or below its sill where something stands before it; a
+    blind in it where there is no room for two, or they would end at the sill."""
     if not setting.walls or setting.use == "outdoor":
         return
     above, before, beyond = RAIL
@@ -83,7 +83,7 @@ def curtains(setting: Setting) -> None:
             kind, variant = str(rng.choice(_styled(setting, CURTAINS))), int(rng.integers(1 << 30))
             full = round(min(0.6, 0.2 + 0.2 * window.width), 3)
             low, high = np.clip((window.offset - beyond, window.end + beyond), 0.02, wall.length - 0.02).tolist()
-            feet = (0.015, *(window.sill - off for off in HEMS if window.sill > 0.5))
+            feet = (0.015, window.sill - APRON) if window.sill > 0.5 else (0.015,)
             down = product(feet[:1], INWARD, BUNCHED)
             for foot, inward, share in chain(down, product(feet[1:], INWARD[:2], BUNCHED)):
                 size = np.array([round(full * share, 3), round(rail - foot + 0.005, 3), 0.085])
@@ -104,16 +104,14 @@ def _styled(setting: Setting, kinds: Sequence[str]) -> Sequence[str]:
 
 
 def _blind(setting: Setting, wall: Wall, window: Opening) -> None:
-    """A blind, let down over a part of the pane, or a curtain on a rod before its lower half."""
+    """A blind, let down over a part of the pane."""
     rng, alike = setting.rng(window.name, "blind"), setting.rng("blinds")
     kinds = BLINDS[:1] if setting.use == "wet" else _styled(setting, BLINDS)
     kind, variant = str(alike.choice(kinds)), int(alike.integers(1 << 30))
-    half = kind == "cafe_curtain"
-    tall = round(window.height * float(0.52 if half else rng.choice((0.2, 0.3, 0.4))), 3)
-    thick = KINDS[kind].low[2]
+    tall, thick = round(window.height * float(rng.choice((0.2, 0.3, 0.4))), 3), KINDS[kind].low[2]
     size = np.array([round(window.width - 0.012, 3), tall, thick])
-    low = 0.012 if half else window.height - 0.004 - tall
-    place = wall.at((window.offset + window.end) / 2, thick / 2 - 0.019, window.sill + low)
+    low = window.sill + window.height - 0.004 - tall
+    place = wall.at((window.offset + window.end) / 2, thick / 2 - 0.019, low)
     setting.placed.append(Thing(kind, size, place, wall.yaw, "", variant))
 
 

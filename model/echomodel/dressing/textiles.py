@@ -50,14 +50,6 @@ def eyelet_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
     return [*_hung(size, rng, FOLD, top=1.0, drift=0.15), *_rings(size, FOLD, below=0.02)]
 
 
-def cafe_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A thin curtain on a rod across a window, below eye level: thick cloth before the light would be a dark fence."""
-    w, h, d = size
-    rod = tube([(-w / 2, h - 0.012, 0), (w / 2, h - 0.012, 0)], 0.006, "metal")
-    cloth = np.array([0.97 * w, h - 0.02, d]), rng, max(0.75 * FOLD, w / 22)
-    return [*_hung(*cloth, top=0.7, drift=0.3, narrow=0.0, material="sheer"), *_rings(size, 1.5 * FOLD), rod]
-
-
 def drape(rng: np.random.Generator) -> str:
     return str(rng.choice(DRAPES))
 

@@ -98,7 +98,7 @@ def test_coats_hang_near_the_wall_on_deep_racks_too(monkeypatch):
 
 def test_curtains_keep_clear_of_the_coats_on_a_rack():
     met = 0
-    for seed, offset in itertools.product(range(6), np.linspace(0.3, 2.6, 12)):
+    for seed, offset in itertools.product(range(6), np.linspace(0.3, 2.6, 24)):
         room = setting("coat_rack", seed=seed, openings=[Opening("window", "window", 0, offset, 1.0, 1.3, 0.9)])
         for rule in (rule for rule in RULES if rule in (walls.curtains, walls.hung_up)):
             rule(room)
@@ -189,8 +189,7 @@ def test_shelves_on_walls_carry_books_and_something_beside(kind, seed, monkeypat
     [
         (-1.5, 0.6, (0.0, 0.1), walls.CURTAINS),
         (-0.9, 0.6, (0.7, 0.8), walls.CURTAINS),  # to a hand's breadth below the sill
-        (-0.9, 1.0, (1.05, 1.15), walls.CURTAINS),  # above what stands there
-        (-0.9, 1.6, (0.9, 2.1), walls.BLINDS),
+        (-0.9, 1.0, (0.9, 2.1), walls.BLINDS),  # curtains would end above the sill
     ],
 )
 def test_curtains_reach_as_far_down_as_there_is_room_and_are_bunched_where_there_is_little(low, tall, foot, kinds):

@@ -75,11 +75,11 @@ def test_solids_that_the_budget_has_no_room_for_are_told_of():
 
 
 @pytest.mark.parametrize("wide", [0.6, 2.4, 3.6])
-def test_a_wide_window_has_the_cloth_of_its_curtain(wide):
-    size, made = np.array([wide, 0.68, 0.036]), dressing.KINDS["cafe_curtain"]
+def test_a_wide_window_has_the_cloth_of_its_blind(wide):
+    size, made = np.array([wide, 0.4, 0.016]), dressing.KINDS["roman_blind"]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        within_budget(dressing.thing("cafe_curtain", size, np.random.default_rng(0)), size, made.faces)
+        within_budget(dressing.thing("roman_blind", size, np.random.default_rng(0)), size, made.faces)
 
 
 @pytest.mark.parametrize("category", [row.name for row in vocabulary().categories if row.support in ("floor", "table")])
