@@ -118,11 +118,12 @@ def terrazzo(chips: int = 900) -> Relief:
 
 
 def boarded(boards: int = 8) -> Relief:
-    """Painted boards side by side, upright, with a groove between them."""
+    """Painted boards side by side, upright, with a groove between them, each of a tone of its own."""
     u, v = _grid()
+    own = np.random.default_rng(73).normal(1.0, 0.012, boards)[np.floor(boards * u).astype(int)]
     apart = np.abs((boards * u + 0.5) % 1.0 - 0.5) + 0 * v
     groove = np.clip(1 - apart / 0.035, 0, 1)
-    return Relief(1 - 0.28 * groove, -0.004 * groove)
+    return Relief(own * (1 - 0.28 * groove), -0.004 * groove)
 
 
 def brick(rows: int = 32, across: int = 8) -> Relief:
@@ -149,7 +150,8 @@ def woven(threads: int = 176) -> Relief:
     over = np.sign(np.sin(np.pi * threads * u) * np.sin(np.pi * threads * v))
     height = np.where(over > 0, np.abs(warp), np.abs(weft))
     fleck = 0.6 * noise(31, 60.0, 160.0) + 0.6 * noise(32, 160.0, 60.0)
-    return Relief(1 + 0.12 * (height - 0.6) + 0.035 * fleck, 0.0001 * height + 0.2 * creased())
+    soft = noise(33, 4.0, 4.0, 3.0)
+    return Relief(1 + 0.12 * (height - 0.6) + 0.045 * fleck + 0.03 * soft, 0.0001 * height + 0.2 * creased())
 
 
 @cache  # four cloths lie in the same
@@ -207,9 +209,9 @@ def leather() -> Relief:
 
 
 def plaster() -> Relief:
-    """Smooth plaster under matt paint: nearly even, the grain of the roller when one stands before it."""
-    fine = noise(71, 110.0, 110.0, 4.0)
-    return Relief(1 + 0.002 * fine, 0.00006 * fine)
+    """Plaster under matt paint: nearly even, hardly flat, the grain of the roller when one stands before it."""
+    fine, soft = noise(71, 110.0, 110.0, 4.0), noise(72, 4.0, 3.0, 3.0)
+    return Relief(1 + 0.004 * fine + 0.01 * soft, 0.0001 * fine + 0.0013 * soft)
 
 
 def papered() -> Relief:
