@@ -1,4 +1,4 @@
-"""What lies and stands on the floor: rugs, shoes, clusters by furniture; what stands in corners where nobody walks."""
+"""What lies and stands on the floor: rugs, clusters by furniture; what stands in corners where nobody walks."""
 
 from itertools import product
 
@@ -7,14 +7,12 @@ import shapely
 
 from echomodel.boxes2d import seen, turned
 from echomodel.dressing import KINDS, names_of, usual
-from echomodel.openings import hinge_point, inward_normal
 from echousd.dressing.setting import Setting, Standing, Thing, around, rectangle
 from echousd.dressing.stories import Wish
 from echousd.dressing.walls import walls_of
 
 PILE = 0.008  # metres; furniture stands on the floor below, through the rug
 FROM_WALL = 0.12
-SHOES = 0.25  # share of rooms with a door that somebody leaves shoes at
 LARGEST, ALONE = (4.2, 3.4), (2.6, 1.7)  # metres: of rugs, and of one that nothing stands on
 LEAST, SHOWS = 1.2, 0.3  # m² of a rug; metres by which it is wider than what stands on it
 LEGS, BEYOND = 0.3, 0.45  # metres from the front of a seat that a rug carries, where its legs stand; around a group
@@ -126,25 +124,6 @@ def _free(setting: Setting, group: list[Standing]) -> shapely.Geometry:
     return setting.room.buffer(-FROM_WALL).difference(
         shapely.union_all([*others, *rugs, *(w for w, _ in setting.ways)])
     )
-
-
-def by_doors(setting: Setting) -> None:
-    """A pair of shoes beside a door, toes to the wall, now and then."""
-    for _, door in setting.ways:
-        if door.kind != "door" or not setting.walls or setting.use:
-            continue
-        rng = setting.rng(door.name, "shoes")
-        if rng.random() > SHOES:  # of rooms, not of doors
-            return
-        size, variant = usual("shoes", rng)
-        hinge, closed = hinge_point(setting.floor, door)
-        inside = inward_normal(setting.floor, door.edge)
-        yaw = float(np.arctan2(-inside[0], -inside[1])) + float(rng.uniform(-0.15, 0.15))
-        along = (door.width + 0.3, door.width + 0.45, door.width + 0.65, -0.3, -0.5)
-        middles = [hinge + closed * share + inside * (size[2] / 2 + 0.05) for share in along]
-        pairs = (Thing("shoes", size, np.array([x, 0.0, z]), yaw, variant=variant) for x, z in middles)
-        if setting.put_first(pairs, margin=0.03):
-            return
 
 
 def clusters(setting: Setting) -> None:

@@ -13,6 +13,7 @@ from echousd.shapes.hulls import forbidden_moves
 
 ASIDE = 0.15  # metres that a thing moves at most so that it stands in nothing
 STEP = 0.02  # metres from place to place
+LOW = 0.15  # share of a seat that is lower than its level: pillows, low arms and crowns are higher
 LEVEL, LIFTED = 0.003, 0.002  # metres: what is as high as that is one height; what stands so far over it is clear of it
 # Metres between folds of a bed, and over its middle from where on it is a board; places behind pillows for cushions.
 SOFT, BOARD, BEYOND = 0.04, 0.12, 12
@@ -41,15 +42,14 @@ class Seat:
         y = corners[..., 1].mean(1)
         top = 0.75 * float(host.size[1])
         up = (normal[:, 1] > 0.85 * double) & (y > 0.2) & (y < min(0.62, top)) & (double > 0)
-        if double[up].sum() / 2 < 0.12:
-            return None
-        order = np.argsort(y[up])
-        share = np.cumsum(double[up][order])
-        level = float(y[up][order][np.searchsorted(share, 0.6 * share[-1])])
         half = host.size[[0, 2]] / 2
         x = np.arange(-half[0], half[0], STEP) + STEP / 2
         z = np.arange(-half[1], half[1], STEP) + STEP / 2
-        return cls(x, z, heights_of(corners[normal[:, 1] > 0.05 * double], x, z), level)
+        height = heights_of(corners[normal[:, 1] > 0.05 * double], x, z)
+        lies = height[(height > 0.2) & (height < min(0.62, top))]
+        if min(double[up].sum() / 2, lies.size * STEP**2) < 0.12:
+            return None
+        return cls(x, z, height, float(np.quantile(lies, LOW)))
 
     def before_pillows(self, x: float, size: np.ndarray) -> np.ndarray | None:
         """(3,) a place at `x` right before what lies at the head; None where it would not lie flat."""

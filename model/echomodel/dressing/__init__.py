@@ -18,6 +18,7 @@ from echomodel.furniture.solids import Block, Lathe, Solid, ball, rotation, tube
 from echomodel.late import Late
 from echomodel.rows import RoomStyle
 
+Pad = Late("echomodel.furniture.pads:Pad")
 Program = Callable[..., list[Solid]]  # of extents (3,) and a generator; `shown`, a row of `prints.toml`, by name
 Size3 = tuple[float, float, float]
 Row = Mapping[str, Any]  # as `things.toml` says
@@ -94,7 +95,9 @@ def _solid(row: Row, size: Size, material: str) -> Solid:
     turn = rotation(*np.radians(row.get("turn", (0, 0, 0))))
     if "box" in row:
         low, high = (np.array(corner) * size for corner in (row["box"][:3], row["box"][3:]))
-        return Block((low + high) / 2, turn, material, half=(high - low) / 2, radius=row.get("round", 0.0))
+        kind = partial(Pad, crown=row["crown"]) if "crown" in row else Block
+        made: Solid = kind((low + high) / 2, turn, material, half=(high - low) / 2, radius=row.get("round", 0.0))
+        return made
     if "ball" in row:
         middle, half = (np.array(numbers) * size for numbers in (row["ball"][:3], row["ball"][3:]))
         return ball(middle, half, material, power=row.get("power", 2.0), turn=turn)

@@ -9,21 +9,17 @@ from echomodel.furniture.carpentry import Size, box
 from echomodel.furniture.solids import Solid, rotation
 
 COVERS = ("book_a", "book_b", "book_c", "book_d")
-COVER = 0.003  # metres
 
 
 def book_row(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """Books upright side by side with their spines to the front, the last one leaning where there is room."""
+    """Books upright side by side with their spines to the front."""
     w, h, d = size
     parts: list[Solid] = []
-    at = -w / 2
-    while True:
-        thick = float(rng.uniform(0.016, 0.042))
-        if at + thick > w / 2:
-            break
+    at, thick = -w / 2, float(rng.uniform(0.016, 0.042))
+    while at + thick <= w / 2:
         tall, deep = h * rng.uniform(0.78, 1.0), d * rng.uniform(0.8, 1.0)
         parts += _upright(at, thick, tall, deep, d, str(rng.choice(COVERS)))
-        at += thick + 0.0008
+        at, thick = at + thick + 0.0008, float(rng.uniform(0.016, 0.042))
     return parts
 
 
@@ -51,7 +47,7 @@ def book(size: Size, rng: np.random.Generator) -> list[Solid]:
 
 
 def _upright(
-    at: float, thick: float, tall: float, deep: float, d: float, cover: str, board: float = COVER, over: float = 0.003,
+    at: float, thick: float, tall: float, deep: float, d: float, cover: str, board: float = 0.003, over: float = 0.003,
     back: float = 0.0012,
 ) -> list[Solid]:  # fmt: skip
     """A book between boards that reach `over` metres beyond its pages, its back rounded by `back` metres."""

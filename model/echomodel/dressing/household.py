@@ -46,8 +46,10 @@ def clock(size: Size, rng: np.random.Generator, marks: int = 0) -> list[Solid]:
     face, middle = rotation(x=np.pi / 2), np.array([0.0, h / 2, -d / 2])
     power, rim = float(rng.choice((2.0, 2.0, 4.0, 8.0))), float(rng.choice((0.38, 0.42, 0.46)))
     case = str(rng.choice(("frame", "metal", "ceramic")))
-    parts: list[Solid] = [turned(middle, (w / 2, h / 2), d * 0.9, turn=face, power=power, material=case)]
-    parts.append(turned(middle, (w * rim, h * rim), d * 0.92, turn=face, power=power, material="paper"))
+    discs = (0.5, 0.9, case), (rim, 0.92, "paper")
+    parts: list[Solid] = [
+        turned(middle, (w * r, h * r), d * t, turn=face, power=power, material=m) for r, t, m in discs
+    ]
     hour = float(rng.uniform(0, 12))
     hands = [(-hour / 12, 0.0, 0.24, 0.012 * w + 0.001), (-hour, 0.0, 0.36, 0.012 * w + 0.001)]
     for share, low, high, half in (*hands, *((number / marks, 0.342, 0.398, 0.008 * w) for number in range(marks))):

@@ -171,8 +171,7 @@ def _tubular(size: Size, style: Style, choices: Choices, seat: float) -> list[So
         back = rear - bow * (1 - share**2)  # the cane is bent as its frame is there
         low, high = (seat + (0.62 + side * 0.36 * share) * up for side in (-1, 1))
         corner, other = (-x * share, low, back - thick / 2), (x * share, high, back + thick / 2)
-        rest = leaning(corner, other, np.arctan(lean), seat, rear, material=of, radius=0.04, bow=bow * share**2)
-        parts.append(rest)
+        parts.append(leaning(corner, other, np.arctan(lean), seat, rear, material=of, radius=0.04, bow=bow * share**2))
     return parts
 
 

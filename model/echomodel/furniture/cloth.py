@@ -1,5 +1,6 @@
 """What hangs in folds or gives way as a whole: pillows, covers of beds, sheets."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -111,12 +112,9 @@ class Cover(Block):
         across = np.concatenate([r - w - side[::-1], over, w - r + side])
         flat = np.linspace(r - d, d - r, max(2, round(0.6 * steps * d / w)) + 1)[1:-1]
         along = np.concatenate([r - d - roll[::-1], flat, d - r + (side if self.falls else roll)])
-        s, t = np.meshgrid(across, along)
-        q = np.stack([np.maximum(np.abs(s) - w + r, 0), np.maximum(np.abs(t) - d + r, 0)])
-        far, length = q.max(0), np.maximum(np.linalg.norm(q, axis=0), 1e-9)
-        out = q / length * np.sign([s, t])  # which way is down from here, in plan
+        _, t = np.meshgrid(across, along)
+        (x, z), out, far, length = beyond((across, along), np.array([w - r, d - r]))
         turn, hung = np.minimum(far / max(r, 1e-9), np.pi / 2), np.clip((far - bend) / (hang[-1] - bend), 0, 1)
-        x, z = np.clip(s, r - w, w - r), np.clip(t, r - d, d - r)
         line = z * out[0] ** 2 + x * out[1] ** 2 + 0.1 * out[0] * out[1]  # metres around the hem
         # how far cloth lies below its highest folds, which fade and swell along their way and are few at the head
         crease = np.abs(np.sin(7 * x + np.sin(4.1 * x + two) + one)) ** 4
@@ -131,7 +129,7 @@ class Cover(Block):
         slack = loose * (0.5 + 0.5 * np.sin(6 * x + two)) * np.clip(1 - (t + d) / 0.25, 0, 1)
         aside = (1 - (x / (w - r)) ** 2) * (0.1 * np.sin(2.3 * z + two) + 0.3 * np.sin(three) * z)
         top = np.stack([x + out[0] * reach + aside, y, z + out[1] * reach + slack], -1)
-        return closed(top, *grid(*s.shape), (0.0, -h, 0.0))
+        return closed(top, *grid(*x.shape), (0.0, -h, 0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,6 +146,16 @@ class Sheet(Solid):
         strip = np.stack([after, border, border + far, after, border + far, after + far], 1).reshape(-1, 3)
         vertices = np.concatenate([self.front.reshape(-1, 3), self.back.reshape(-1, 3)])
         return vertices, outward(vertices, np.concatenate([faces, faces[:, ::-1] + far, strip]))
+
+
+def beyond(lines: Sequence[Array], flat: Array) -> tuple[Array, Array, Array, Array]:
+    """Where places of two `lines` on a cloth leave what is `flat` (2,) to either side of its middle, (2, m, n), which
+    way they lie from there, and how far (m, n): along the line that is farther out, and straight.
+    """
+    places = np.stack(np.meshgrid(*lines))
+    edge = np.clip(places, -flat[:, None, None], flat[:, None, None])
+    length = np.maximum(np.linalg.norm(places - edge, axis=0), 1e-9)
+    return edge, (places - edge) / length, np.abs(places - edge).max(0), length
 
 
 def grid(n: int, m: int) -> tuple[Array, Array]:

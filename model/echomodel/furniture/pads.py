@@ -5,14 +5,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from echomodel.furniture.carpentry import between
-from echomodel.furniture.cloth import outward
-from echomodel.furniture.solids import FINEST, IDENTITY, Array, Block, Solid, Vector, loft, superellipse, tube
+from echomodel.furniture.cloth import beyond, closed, grid
+from echomodel.furniture.solids import FINEST, IDENTITY, Array, Block, Solid, Vector, loft, tube
 from echomodel.furniture.style import Style
 
 # Role of a cushion -> of its crown: how deep it is dented where one sits or leans, and how else its face is uneven.
-GIVES = {"seat": (0.3, 0.14), "back": (0.1, 0.3), "": (0.0, 0.2)}  # others are firm
-DRAWN = 0.033  # metres that corners are drawn in at most
-SHARES = (0.85, 0.6, 0.35, 0.15)  # of the way from a cushion's edge to its middle, where it has points
+GIVES = {"seat": (0.42, 0.14), "back": (0.15, 0.3), "": (0.0, 0.2)}  # others are firm
+SAT, FULL = 0.62, 0.025  # metres of a seat for one person; of a crown from which on it is dented so
+LEVEL = 0.35  # of a crown that its edges are high amid a side, over the corners
+DRAWN = (0.03, 0.014)  # metres that corners are drawn in at most, and those of seats
+CELLS = (0.45, 0.22, 0.13, 0.1)  # metres between points of a face, by detail
 # Metres that cloth is drawn in at a seam, and along it to where it is not; radius of a cord that is sewn in.
 SEWN, BESIDE, CORD = 0.006, 0.007, 0.0058
 
@@ -20,8 +22,9 @@ SEWN, BESIDE, CORD = 0.006, 0.007, 0.0058
 @dataclass(frozen=True, eq=False)
 class Pad(Block):
     """A filled cushion: its face stands out in its middle by `crown` metres over a seam that runs around it; below that
-    is a band, which stands out less, and behind it is flat. It is dented where one sits or leans, and else by where it
-    stands, so that no two in a row are alike. Its outline is a superellipse of `power`.
+    is a band, which stands out less, and behind it is flat. Corners are drawn in and hang. It is dented where people
+    sit or lean, and else by where it stands, so that no two in a row are alike. Its outline is a superellipse where it
+    has a `power`.
     """
 
     soft = True
@@ -29,36 +32,52 @@ class Pad(Block):
     crown: float = 0.02
     power: float = np.inf
 
-    def _rings(self, detail: int, corners: int) -> Array:
-        """(k, corners, 3): loops around its face, from within to its border, and down its sides."""
-        thin, r = int(np.argmin(self.half)), min(self.radius, *(self.half * 0.999))
-        tall, wide, bulge = self.half[thin], np.roll(self.half, -thin)[1:], 0.14 * self.crown
-        # metres within its border, and below its face: over its edge, in its seam, below that, down its side
-        edge = [(r, 0), (0.15 * r, 0.48 * r), (SEWN, 0.5 * r + BESIDE), (0, 0.5 * r + 2 * BESIDE)]
-        edge += [(-bulge, 0.25 * r + BESIDE + tall), (0.06 * r + bulge, 2 * tall)]
-        face, rows = (((0.6,), "0125"), ((0.8, 0.4), "0125"), ((0.8, 0.5, 0.2), "01245"), (SHARES, "012345"))[detail]
-        inside, down = np.array(
-            [*((r + share * (min(wide) - r), 0) for share in face), *(edge[int(n)] for n in rows)]
-        ).T
-        outline = superellipse(min(self.power, max(wide) / max(min(1.1 * self.crown, DRAWN), 1e-3)), corners)
-        side = outline * (wide - bulge - inside[:, None, None])
-        u, v = np.moveaxis(side / wide, -1, 0)
+    def _cloth(self, detail: int) -> Array:
+        """(n, m, 3): rows and columns of points over its face and down its sides."""
+        thin = int(np.argmin(self.half))
+        across, along = ((2, 1), (0, 2), (0, 1))[thin]
+        tall, r, bulge = self.half[thin], min(self.radius, *(self.half * 0.999)), 0.14 * self.crown
+        wide = self.half[[across, along]] - bulge
+        # metres without its flat face, and below it: over its edge, in its seam, below that, down its side
+        edge = [(0, 0), (0.85 * r, 0.48 * r), (r - SEWN, 0.5 * r + BESIDE), (r, 0.5 * r + 2 * BESIDE)]
+        edge += [(r + bulge, 0.25 * r + BESIDE + tall), (0.94 * r - bulge, 2 * tall)]
+        out, down = np.array([edge[int(n)] for n in ("0125", "0125", "01245", "012345")[detail]]).T
+        rings, lines = np.arange(1, len(out)), []
+        for half in wide - r:
+            flat = np.linspace(-half, half, int(np.clip(round(2 * half / CELLS[detail]), 2, 14)) + 1)
+            lines.append(np.concatenate([-half - rings[::-1], flat, half + rings]))
+        inner, away, ring, _ = beyond(lines, wide - r)
+        out, down = out[ring.round().astype(int)], down[ring.round().astype(int)]
+        u, v = places = (inner + away * out) / wide[:, None, None]
+        if np.isfinite(self.power):
+            far = abs(places)
+            u, v = places * far.max(0) / np.maximum((far**self.power).sum(0), 1e-9) ** (1 / self.power)
+        else:
+            drawn = min(1.3 * self.crown, DRAWN[self.role == "seat"]) / wide
+            u, v = u * (1 - drawn[0] * v**6), v * (1 - drawn[1] * u**6)
         low = v + 0.3 * (1 - v**2) if self.role == "back" else v  # its filling has settled
-        dome = (1 - np.abs(u) ** 2.6) * (1 - np.abs(low) ** 2.6)
         phase = 9.0 * float(self.centre @ (1.0, 0.7, 1.3))
         sat, uneven = GIVES.get(self.role, GIVES[""])
-        dent = sat * np.exp(-4 * (u**2 + (v - 0.15) ** 2)) - uneven * np.sin(2.6 * u + phase) * np.cos(2.2 * v + phase)
-        lower = self.crown * (1 - dome * (1 - dent)) * np.clip(1 - down / (2 * tall), 0, 1)[:, None]
-        high = np.maximum(tall - down[:, None] - lower, -tall)
+        dent, seats = -uneven * np.sin(2.6 * u + phase) * np.cos(2.2 * v + phase), max(1, round(2 * wide[0] / SAT))
+        for n, at in enumerate((np.arange(seats) + 0.5) / seats * 2 - 1):
+            near = ((u - at) * wide[0] / 0.19) ** 2 + (v * wide[1] / 0.21 + 0.15) ** 2
+            dent += sat * min(1.0, self.crown / FULL) * (1 + 0.4 * np.sin(phase + 2.4 * n)) * np.exp(-near)
+        dome = np.clip((1 - abs(u) ** 3) * (1 - abs(low) ** 3), 0, 1)
+        high = LEVEL * (1 - np.clip(u * v, -1, 1) ** 4) + (1 - LEVEL) * dome * (1 - dent)
+        lower = down + self.crown * (1 - high) * np.clip(1 - down / (2 * tall), 0, 1)
         front = -float(np.sign(self.centre[0]) or 1.0) if thin == 0 else 1.0  # an arm's face looks towards the seat
-        return np.roll(np.stack([front * high, *np.moveaxis(side, -1, 0)], -1), thin, -1)
+        points = np.empty((*u.shape, 3))
+        points[..., thin], points[..., across], points[..., along] = front * (tall - lower), u * wide[0], v * wide[1]
+        return points
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
-        vertices, faces = loft(self._rings(detail, (12, 16, 24, 32)[detail]))
-        return vertices, outward(vertices, faces)
+        points = self._cloth(detail)
+        faces, border = grid(*points.shape[:2])
+        return closed(points, faces, border, points.reshape(-1, 3)[border].mean(0))
 
     def seam(self) -> Array:
-        return np.asarray(self._rings(0, 20)[3])
+        sewn = self._cloth(0)[1:-1, 1:-1]
+        return sewn.reshape(-1, 3)[grid(*sewn.shape[:2])[1]]
 
 
 @dataclass(frozen=True, eq=False)
