@@ -10,8 +10,8 @@ import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade
 
 from echousd.checks.mesh_rules import of_others
-from echousd.checks.placement import inside_solid
 from echousd.checks.reading import RULES, Finding, Reading, StageRule, applied, below, rule
+from echousd.make.collisions import inside_solid
 from echousd.stage.contents import room_frame
 from echousd.stage.values import NOW, UNREADABLE, asset
 

@@ -211,6 +211,6 @@ def room_lines(written: Written) -> Iterator[str]:
         kept = f"{counts['kept']} of {counts['kept'] + counts['broken']} measured relations kept"
         yield f"layout_{number} {kept}" if several else f"graph    {counted(len(room.names), 'object')}, {kept}"
         yield from (f"broken   {verdict.sentence} (margin {verdict.margin:+.2f})" for verdict in found.broken)
-        yield from (f"collide  {hit.first} and {hit.second} by {hit.depth:.2f} m" for hit in found.collisions)
+        yield from (f"collide  {hit.first} and {hit.second} by {hit.depth:.3f} m" for hit in found.collisions)
         yield from (f"restless {sentence}" for sentence in found.restless)
     yield from (f"note     {note}" for note in room.notes)

@@ -5,27 +5,29 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from echomodel.boxes import Boxes
-from echomodel.late import lates
+from echomodel.late import Late, lates
 from echousd.graph import SceneGraph
 from echousd.graph.arrays import rounded_boxes
 from echousd.make.scene import scene_of
 from echousd.make.verdicts import relation_verdicts, unbroken
-from echousd.place.geometry import SOLID, TOUCH, Collision, pair_indices, separation
+from echousd.place.geometry import SOLID, Collision
 from echousd.place.living import plan_to_live_in
 from echousd.room import LayoutOutcome
 from echousd.shapes.geometry import Geometry
 
 moved_apart, moved_by, moved_onto_top = lates("echousd.make.moving", "moved_apart", "moved_by", "moved_onto_top")
+told = Late("echousd.make.collisions:told")
 DEEP = 0.001  # metres that solids may reach into one another
 ROUNDS = 4  # moves a piece
 
 
 def cleared_layouts(
     graphs: Sequence[SceneGraph], layouts: Sequence[Boxes], geometry: Mapping[str, Geometry], floor: np.ndarray, *,
-    walls: bool,
+    walls: bool, place: bool = True,
 ) -> tuple[list[Boxes], tuple[LayoutOutcome, ...]]:  # fmt: skip
     """Every layout `cleared`, and what became of it; one graph a layout, which says what must stay."""
-    found = [cleared(graph, boxes, geometry, floor, walls=walls) for graph, boxes in zip(graphs, layouts, strict=True)]
+    rooms = zip(graphs, layouts, strict=True)
+    found = [cleared(graph, boxes, geometry, floor, walls=walls, place=place) for graph, boxes in rooms]
     outcomes = [
         LayoutOutcome(relation_verdicts(graph, boxes), left) for graph, (boxes, left) in zip(graphs, found, strict=True)
     ]
@@ -33,29 +35,30 @@ def cleared_layouts(
 
 
 def cleared(
-    graph: SceneGraph, boxes: Boxes, geometry: Mapping[str, Geometry], floor: np.ndarray, *, walls: bool
-) -> tuple[Boxes, tuple[Collision, ...]]:
+    graph: SceneGraph, boxes: Boxes, geometry: Mapping[str, Geometry], floor: np.ndarray, *, walls: bool,
+    place: bool = True,
+) -> tuple[Boxes, tuple[Collision, ...]]:  # fmt: skip
     """Move what is free as little as possible until nothing starts inside anything else.
 
-    Returns the boxes, and what still reaches into one another, or into what a wall holds, as far as `check` says so,
-    deepest first.
+    Returns the boxes, and what still reaches into one another, or into what a wall holds, as `check` says it, deepest
+    first.
 
     What is locked or has a position stays, and no relation that holds is broken: where only that would help, the two
     stay where they are and are among the collisions. Living rules are kept before distances.
 
     `graph`: N objects. `boxes`: N boxes in its order. `geometry`: name -> solids of each, in its own frame. `floor`:
     (k, 2) float, corners of the floor, metres. `walls`: whether there are any; their sills and casings reach into the
-    room.
+    room. `place`: whether anything is moved.
     """
     room = plan_to_live_in(graph, boxes, floor)
     scene = scene_of(graph, room, geometry, floor, walls=walls)
     holds = frozenset(unbroken(graph, boxes))
     moves = np.zeros((len(graph.nodes), 2))
-    for one in range(len(graph.nodes)):
+    for one in range(len(graph.nodes) * place):
         if scene.hangs_over(one, moves):
             moves = moved_onto_top(scene, graph, boxes, moves, one, holds)
     stuck: set[tuple[int, int]] = set()
-    for _ in range(ROUNDS * max(len(graph.nodes), 1)):
+    for _ in range(ROUNDS * len(graph.nodes) * place):
         hits = [pair for pair, _ in scene.overlaps(moves, DEEP) if pair not in stuck]
         if not hits:
             break
@@ -65,9 +68,5 @@ def cleared(
         else:
             moves = found
     boxes = rounded_boxes(graph, moved_by(boxes, moves)) if moves.any() else boxes
-    left, pairs = scene.overlaps(moves, SOLID), pair_indices(len(moves))
-    size, position, yaw = (np.asarray(values, float) for values in (boxes.size, boxes.position, boxes.yaw))
-    gaps = separation(size, position, yaw, pairs)
-    apart = dict(zip(map(tuple, pairs.tolist()), gaps, strict=True))
-    names = [(scene.names[i], scene.names[k], deep) for (i, k), deep in left if -apart.get((i, k), -np.inf) > TOUCH]
-    return boxes, tuple(Collision(*ends) for ends in names)
+    met = [pair for pair, _ in scene.overlaps(moves, SOLID)]
+    return boxes, told(scene, boxes, [geometry[name].parts for name in graph.names], np.array(met)) if met else ()

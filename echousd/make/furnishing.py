@@ -19,7 +19,6 @@ from echousd.graph.floors import with_lowered_windows
 from echousd.make.clearing import cleared_layouts
 from echousd.make.finished import Room
 from echousd.make.layouts import LayoutSearch, finished_boxes, most_drafts, plan_boxes, room_floor, with_free_openings
-from echousd.make.verdicts import layout_outcome
 from echousd.naming import free_name
 from echousd.options import RoomOptions
 from echousd.room import LayoutOutcome, Provenance
@@ -115,11 +114,12 @@ def furnished(brief: Brief) -> Room:
     geometry = {name: shaped[name] for name in graph.names}
     assets = own_names(brief.assets, asset_names(made.owners, {node.name: node.category for node in graph.nodes}))
     layouts = as_made(layouts)
-    floor, outcomes = room_floor(graph, layouts), tuple(layout_outcome(graph, boxes) for boxes in layouts)
-    for rest in reversed(range(ROUNDS if asked.place else 0)):
+    floor = room_floor(graph, layouts)
+    for rest in reversed(range(ROUNDS if asked.place else 1)):
         with timer.stage("place"), one_thread():
             pins = [with_boxes(graph, boxes, moving) for boxes in there]
-            layouts, outcomes = cleared_layouts(pins, as_made(layouts), geometry, floor, walls=asked.walls)
+            built = {"walls": asked.walls, "place": asked.place}
+            layouts, outcomes = cleared_layouts(pins, as_made(layouts), geometry, floor, **built)
         way = brief.in_the_way(layouts[0], outcomes[0], moving) if search is not None and rest else set()
         if not way:
             break

@@ -37,6 +37,7 @@ class Scene:
     floor: shapely.Polygon  # the floor, a little wider
     bounds: np.ndarray  # (s, 2, 3) float, boxes of everything
     names: Sequence[str]  # s names, those of walls for what they hold
+    fittings: Sequence[Mesh]  # s - n meshes of these, in the room
     # pair -> forbidden moves of its first against its second from where both stood at first
     known: dict[tuple[int, int], BaseGeometry] = field(default_factory=dict)
 
@@ -114,15 +115,15 @@ def scene_of(
     built = walls_of(plan, height, graph.room.openings, thickness=graph.room.walls) if walls else []
     # what stands before the walls: sills, casings, leaves; walls themselves are the floor's edge
     fitted = ((part.name, piece) for part in built for filled in part.inner for piece in filled.pieces)
-    shell = [(name, _boards(piece.mesh)) for name, piece in fitted if piece.solid]
-    everything = [*solids, *(pieces for _, pieces in shell)]
+    shell = [(name, piece.mesh) for name, piece in fitted if piece.solid]
+    everything = [*solids, *(_boards(mesh) for _, mesh in shell)]
     return Scene(
         everything, np.array([node.locked or node.position is not None for node in nodes] + [True] * len(shell)),
         room.carrier, room.anchor, yaw, room.of("seat"), np.sqrt(size[:, 0] * size[:, 2]),
         [shapely.Polygon(corner) for corner in footprints(size, position, yaw)],
         [_level(pieces) for pieces in solids], shapely.Polygon(floor).buffer(EDGE, join_style="mitre"),
         np.array([bounds_of(np.concatenate(pieces)) for pieces in everything]),
-        [*graph.names, *(wall for wall, _ in shell)],
+        [*graph.names, *(wall for wall, _ in shell)], [mesh for _, mesh in shell],
     )  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from echomodel.arrays import norm
 from echomodel.boxes2d import outline, seen, to_frame
 from echomodel.floors import Walls, signed_distance
 from echomodel.objective.support import allowed_overlap
-from echomodel.openings import edge_lengths, signed_area
+from echomodel.openings import SKIRTING, edge_lengths, signed_area
 
 if TYPE_CHECKING:
     from echousd.place.problem import Problem
@@ -142,6 +142,7 @@ def beyond(floor: Floor, size: np.ndarray, at: np.ndarray, turn: np.ndarray) -> 
 
 TOUCH = 0.01  # metres: deeper than this into another box is a collision, further than this outside is outside
 SOLID = 0.006  # metres: where boxes do, a point of one solid this far inside another is a collision
+IN_WALL = SKIRTING + 0.003  # metres, of what a wall holds: furniture stands at the wall behind its skirting
 
 
 @dataclass(frozen=True)
@@ -153,7 +154,7 @@ class Collision:
     depth: float
 
     def __str__(self) -> str:
-        return f"{self.first} and {self.second} collide by {self.depth:.2f} m"
+        return f"{self.first} and {self.second} collide by {self.depth:.3f} m"
 
     def to_json(self) -> dict[str, Any]:
         """The entry of the manifest, and of a check's report."""

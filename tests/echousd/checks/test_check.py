@@ -17,15 +17,12 @@ from echousd.checks.placement import (
     Carriers,
     Whole,
     _small_faults,
-    distances,
     find_collisions,
-    mesh_depth,
-    surface_points,
-    winding_number,
 )
 from echousd.checks.report import find_living
 from echousd.cli.main import run
 from echousd.graph import Node, RoomSpec, SceneGraph
+from echousd.make.collisions import distances, mesh_depth, surface_points, winding_number
 from echousd.place.geometry import SOLID, Floor
 from echousd.stage.contents import RoomContents, RoomObject, Shape, Surrounding
 
@@ -220,8 +217,8 @@ def test_a_chair_stands_under_a_table_and_not_in_it() -> None:
 def test_depth_of_two_boxes() -> None:
     first = thing("a", "cabinet", box(1, 1, 1), (0, 0, 0))
     second = thing("b", "cabinet", box(1, 1, 1), (0.8, 0, 0))
-    assert mesh_depth(first, second) == pytest.approx(0.2, abs=0.04)
-    assert mesh_depth(first, thing("c", "cabinet", box(1, 1, 1), (1.001, 0, 0))) == 0.0
+    assert mesh_depth(first, second, SOLID) == pytest.approx(0.2, abs=0.04)
+    assert mesh_depth(first, thing("c", "cabinet", box(1, 1, 1), (1.001, 0, 0)), SOLID) == 0.0
 
 
 def test_depth_of_boards_that_overlap_is_that_of_a_slow_look() -> None:
@@ -250,7 +247,7 @@ def test_large_faces_that_touch_by_millimetres_are_no_collision() -> None:
     for reach, deep in ((0.003, False), (0.02, True)):
         tip = box(0.02, 0.5, 0.3)
         tip.apply_translation((1.51 - reach, 0, 0))
-        assert (mesh_depth(wide, thing("b", "cabinet", tip, (0, 0, 0))) > SOLID) == deep
+        assert (mesh_depth(wide, thing("b", "cabinet", tip, (0, 0, 0)), SOLID) > SOLID) == deep
 
 
 def test_winding_number_agrees_with_ray_casting() -> None:
