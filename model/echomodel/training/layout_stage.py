@@ -107,7 +107,7 @@ class LayoutStage:
             latent = model.latent(batch.graph.category, batch.pairs)
             _, parts = layout_loss(model, batch, latent, torch.Generator().manual_seed(1), self.recipe)
             out |= {f"{name}/held_{part}": float(value) for part, value in parts.items()}
-            boxes = sample_boxes(model, batch, generator)
+            boxes = sampled_boxes(model, batch, generator, model.config.layout.steps)
             cpu, made = batch.to("cpu"), boxes.to("cpu")
             found = faults_of(plan_of_batch(cpu, made, torch.zeros(len(made), dtype=torch.bool)))
             out[f"{name}/faults"] = len(found) / len(made)
@@ -139,19 +139,6 @@ class _Batches(IterableDataset):
             yield draw_batch(self.rooms, self.nodes, generator)
 
 
-def sample_boxes(model: CompactModel, batch: LayoutBatch, generator: torch.Generator) -> Boxes:
-    """Sample all boxes of a batch with the config's sampler and steps."""
-    layout = model.config.layout
-    latent = model.latent(batch.graph.category, batch.pairs)
-    predict = layout_predictor(model, batch.graph, batch.pairs, latent, batch.rules)
-    noise = normal((batch.graph.num_nodes, 8), generator, model.device)
-    vectors = sample(
-        layout.sampler, predict, noise, layout.steps, layout.objective, generator=generator,
-        temperature=temperatures(layout, noise),
-    )  # fmt: skip
-    return Boxes.decode(vectors, box_scale(model, batch.graph.category))
-
-
 STEPS, KEPT = (5, 10), 2  # of a draw at least and at most, and its last steps, which the gradient goes through
 LONGEST = 200.0  # slope of one box at a step: one that turns at a hair's breadth would drown all others
 ASKED = 0.02  # metres, radians or a share beyond a term's margin
@@ -172,7 +159,8 @@ def drawn_loss(model: CompactModel, batch: LayoutBatch, generator: torch.Generat
 
     Returns the loss, and the parts that the log names.
     """
-    drawn = drawn_boxes(model, batch, generator)
+    steps = int(torch.randint(STEPS[0], STEPS[1] + 1, (), generator=generator))
+    drawn = sampled_boxes(model, batch, generator, steps)
     free = torch.zeros(len(drawn), dtype=torch.bool, device=drawn.yaw.device)
     with drawn.yaw.device:  # where the plan makes its numbers
         plan = plan_of_batch(batch, drawn, free)
@@ -206,20 +194,20 @@ def carrier_of(batch: LayoutBatch) -> Tensor:
     return out
 
 
-def drawn_boxes(model: CompactModel, batch: LayoutBatch, generator: torch.Generator) -> Boxes:
-    """Boxes (N) as the network's own sampler ends with them; its last `KEPT` steps keep the gradient."""
-    layout = model.config.layout
+def sampled_boxes(model: CompactModel, batch: LayoutBatch, generator: torch.Generator, steps: int) -> Boxes:
+    """Boxes (N) as the config's sampler ends with them after so many steps, of which the last `KEPT` keep the gradient
+    where there is one."""
+    layout, slopes = model.config.layout, torch.is_grad_enabled()
     with torch.no_grad():
         latent = model.latent(batch.graph.category, batch.pairs)
     predict = layout_predictor(model, batch.graph, batch.pairs, latent, batch.rules)
-    steps = int(torch.randint(STEPS[0], STEPS[1] + 1, (), generator=generator))
 
     def late(x: Tensor, level: Tensor) -> Tensor:
         x = torch.cat([x[:, :3].detach(), x[:, 3:]], 1)  # or furniture would shrink between two steps
-        with torch.set_grad_enabled(float(level[0]) * steps < KEPT + 0.5):
+        with torch.set_grad_enabled(slopes and float(level[0]) * steps < KEPT + 0.5):
             return steadied(predict(x, level))
 
-    noise = normal((batch.graph.num_nodes, 8), generator, batch.graph.category.device)
+    noise = normal((batch.graph.num_nodes, 8), generator, model.device)
     x = sample(
         layout.sampler, late, noise, steps, layout.objective, generator=generator,
         temperature=temperatures(layout, noise),

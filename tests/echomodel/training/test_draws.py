@@ -15,7 +15,7 @@ from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_rooms
 from echomodel.training import layout_stage as draws
 from echomodel.training.layout_losses import plan_of_batch
-from echomodel.training.layout_stage import carrier_of, drawn_boxes, drawn_loss, missed_terms, steadied
+from echomodel.training.layout_stage import carrier_of, drawn_loss, missed_terms, sampled_boxes, steadied
 from echomodel.training.rooms import PackedRooms, make_batch, plan_of_rooms
 
 
@@ -94,8 +94,7 @@ def test_the_gradient_goes_through_the_last_steps_alone(batch, model, monkeypatc
         return seen
 
     monkeypatch.setattr(draws, "layout_predictor", watched)
-    monkeypatch.setattr(draws, "STEPS", (5, 5))
-    assert drawn_boxes(model, batch, torch.Generator().manual_seed(1)).position.requires_grad
+    assert sampled_boxes(model, batch, torch.Generator().manual_seed(1), 5).position.requires_grad
     assert calls == [False, False, False, True, True]
 
 
