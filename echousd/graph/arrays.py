@@ -86,7 +86,6 @@ def graph_batch(graph: SceneGraph) -> GraphBatch:
         triplets_of(graph),
         room_type=words.room_type_id(graph.room.type),
         floor=graph.room.floor_polygon or graph.room.size,
-        names=[node.name for node in graph.nodes],
         openings=graph.room.openings,
         placements=[
             (one.subject, kinds.index(one.placement), *(one.others or (-1, -1))) for one in stated_placements(graph)

@@ -39,7 +39,6 @@ class GraphBatch:
         room_type: (S,) int64, position in the vocabulary's room types.
         floor: (S, K, 2) float32, x and z of each floor's corners about the centre of their bounding box, metres; padded
             with NaN, all NaN = unknown.
-        names: N node names, or None.
         openings: (S, O, ROW) float32, doors and windows (`echomodel.floors`), padded with NaN; None = none.
         placements: (P, 4) int64, [subject, position in the vocabulary's placements, and the two other nodes that it
             names, -1 where it names none]; None = none.
@@ -53,7 +52,6 @@ class GraphBatch:
     scene: Array
     room_type: Array
     floor: Array
-    names: tuple[str, ...] | None = None
     openings: Array = None
     placements: Array = None
     height: Array = None
@@ -83,15 +81,13 @@ class GraphBatch:
                 raise ValueError(f"GraphBatch.{name} is {found}, expected {shape} {dtype}")
             if array.device != self.category.device:
                 raise ValueError(f"GraphBatch.{name} is on {array.device}, category on {self.category.device}")
-        if self.names is not None and len(self.names) != nodes:
-            raise ValueError(f"GraphBatch.names has {len(self.names)} names for {nodes} nodes")
 
     @classmethod
     def single(
         cls, category: Sequence[int] | Array, triplets: Sequence[Sequence[int]] | Array = (), *, room_type: int = 0,
         floor: Sequence[float] | Sequence[Sequence[float]] | np.ndarray | None = None,
-        names: Sequence[str] | None = None, openings: Sequence[Opening] = (),
-        placements: Sequence[Sequence[int]] | Array = (), height: float | None = None, device: Any = "cpu",
+        openings: Sequence[Opening] = (), placements: Sequence[Sequence[int]] | Array = (),
+        height: float | None = None, device: Any = "cpu",
     ) -> GraphBatch:  # fmt: skip
         """One scene graph from plain lists; arguments as in the class.
 
@@ -103,7 +99,6 @@ class GraphBatch:
         return cls(
             category=nodes, triplets=np.asarray(triplets, np.int64).reshape(-1, 3),
             scene=np.zeros_like(nodes), room_type=np.array([room_type], np.int64), floor=corners[None],
-            names=None if names is None else tuple(names),
             openings=opening_rows(() if floor is None else openings, corners)[None],
             placements=np.asarray(placements, np.int64).reshape(-1, 4),
             height=np.array([np.nan if height is None else height], np.float32),
@@ -111,7 +106,7 @@ class GraphBatch:
 
     @classmethod
     def pack(cls, graphs: Iterable[GraphBatch]) -> GraphBatch:
-        """Put graphs behind one another as one disjoint graph; names survive when every graph has them."""
+        """Put graphs behind one another as one disjoint graph."""
         graphs = list(graphs)
         if not graphs:
             raise ValueError("GraphBatch.pack needs at least one graph, got none")
@@ -122,12 +117,11 @@ class GraphBatch:
             scenes.append(graph.scene + count)
             nodes += graph.num_nodes
             count += graph.num_scenes
-        names, xp = [graph.names for graph in graphs], kit(graphs[0].floor)
+        xp = kit(graphs[0].floor)
         return cls(
             category=xp.concat([graph.category for graph in graphs]), triplets=xp.concat(triplets),
             scene=xp.concat(scenes), room_type=xp.concat([graph.room_type for graph in graphs]),
             floor=padded([graph.floor for graph in graphs]),
-            names=None if any(n is None for n in names) else tuple(name for n in names for name in n or ()),
             openings=padded([graph.openings for graph in graphs]), placements=xp.concat(placements),
             height=xp.concat([graph.height for graph in graphs]),
         )  # fmt: skip
@@ -149,7 +143,7 @@ class GraphBatch:
 
     def to(self, device: Any) -> GraphBatch:
         """The same batch as tensors on a device, or with None as arrays of numpy."""
-        moved = {f.name: on_device(getattr(self, f.name), device) for f in fields(self) if f.name != "names"}
+        moved = {f.name: on_device(getattr(self, f.name), device) for f in fields(self)}
         return replace(self, **moved)
 
     def with_triplets(self, triplets: Array) -> GraphBatch:

@@ -27,16 +27,13 @@ def graphs(draw: st.DrawFn) -> GraphBatch:
     places = draw(st.lists(st.tuples(st.integers(0, nodes - 1), st.just(0), st.just(-1), st.just(-1)), max_size=3))
     if nodes > 2:
         places += draw(st.lists(st.just((nodes - 1, 2, 0, 1)), max_size=1))
-    return GraphBatch.single(
-        categories, triplets, room_type=draw(st.integers(0, 4)), floor=floor, names=[f"n{i}" for i in range(nodes)],
-        placements=places,
-    )  # fmt: skip
+    return GraphBatch.single(categories, triplets, room_type=draw(st.integers(0, 4)), floor=floor, placements=places)
 
 
 def equal(a: GraphBatch, b: GraphBatch) -> bool:
     fields = ("category", "triplets", "scene", "room_type", "placements")
     same = all(torch.equal(getattr(a, k), getattr(b, k)) for k in fields)
-    return same and torch.equal(a.floor.nan_to_num(-1), b.floor.nan_to_num(-1)) and a.names == b.names
+    return same and torch.equal(a.floor.nan_to_num(-1), b.floor.nan_to_num(-1))
 
 
 def unpacked(packed: GraphBatch) -> list[GraphBatch]:
@@ -46,10 +43,9 @@ def unpacked(packed: GraphBatch) -> list[GraphBatch]:
     for number, count in enumerate(packed.node_counts.tolist()):
         nodes, room = slice(start, start + count), slice(number, number + 1)
         triplets = packed.triplets[owner == number] - cast([start, 0, start], packed.triplets)
-        names = None if packed.names is None else packed.names[nodes]
         graph = GraphBatch(
             packed.category[nodes], triplets, packed.scene[nodes] * 0, packed.room_type[room],
-            trimmed(packed.floor[room]), names, there(packed.openings[room]),
+            trimmed(packed.floor[room]), there(packed.openings[room]),
             shifted(packed.placements[placed == number], -start), packed.height[room],
         )  # fmt: skip
         out.append(graph)
@@ -73,11 +69,10 @@ def test_pack_unpack_is_lossless(singles: list[GraphBatch]) -> None:
     assert equal(GraphBatch.pack(unpacked(packed)), packed)
 
 
-def test_pack_of_packed_graphs_and_missing_names() -> None:
-    one = GraphBatch.single([1, 2], [[0, 1, 1]], names=["a", "b"])
+def test_pack_of_packed_graphs() -> None:
+    one = GraphBatch.single([1, 2], [[0, 1, 1]])
     bare = GraphBatch.single([3, 4, 5], [[2, 5, 0]])
     packed = GraphBatch.pack([GraphBatch.pack([one, bare]), bare])
-    assert packed.names is None
     assert packed.triplets.tolist() == [[0, 1, 1], [4, 5, 2], [7, 5, 5]]
     assert packed.scene.tolist() == [0, 0, 1, 1, 1, 2, 2, 2]
 
