@@ -11,12 +11,11 @@ from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils
 from echomodel.triangles import area_normals, bounds_of
 from echousd.exporting.packing import asset_paths
 from echousd.stage.contents import HIDDEN, RoomContents, components, read_contents, triangulated
-from echousd.stage.encoding import StageError
 from echousd.stage.files import prim_specs, specs
 from echousd.stage.forms import is_subdivision
 from echousd.stage.read import RoomPrims, find_rooms
 from echousd.stage.units import metres_per_unit
-from echousd.stage.values import NOW, UNREADABLE, MeshArrays, fans, matrix, mesh_arrays
+from echousd.stage.values import NOW, UNREADABLE, MeshArrays, fans, matrix, mesh_arrays, readable
 
 Found = TypeVar("Found")
 
@@ -77,10 +76,8 @@ class Reading:
     @cached_property
     def rooms(self) -> list[RoomPrims]:
         """The rooms; none where they cannot be told, which echo:EdgeTargets reports."""
-        try:
-            return find_rooms(self.stage)
-        except StageError:
-            return []
+        none: list[RoomPrims] = []
+        return readable(lambda: find_rooms(self.stage), none)
 
     @cached_property
     def nodes(self) -> list[Usd.Prim]:

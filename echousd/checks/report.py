@@ -31,7 +31,6 @@ from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source, usd_error
 from echousd.stage.foreign import UNTOLD
 from echousd.stage.pen import ARTICULATED, ARTICULATION
-from echousd.stage.read import RoomPrims, find_rooms
 from echousd.stage.showing import each_layout, showing_variant
 from echousd.stage.values import UNREADABLE, readable
 
@@ -282,8 +281,7 @@ def check(
 
 def check_layout(reading: Reading, name: str, rules: str) -> tuple[tuple[str, ...], LayoutReport]:
     """Prim paths of the rooms, and what is wrong with them as a stage shows them, in the layout of that name."""
-    none: list[RoomPrims] = []  # echo:EdgeTargets tells why not
-    rooms = [Whole.of(prims, reading) for prims in readable(lambda: find_rooms(reading.stage), none)]
+    rooms = [Whole.of(prims, reading) for prims in reading.rooms]
     report = LayoutReport(
         name,
         tuple(relation for whole in rooms for relation in verdicts_of(whole.room, rules)),

@@ -32,8 +32,8 @@ def doctor(as_json: bool = False) -> None:
 
 
 def _show(findings: list[Diagnosis]) -> None:
-    from rich.markup import escape
     from rich.table import Table
+    from rich.text import Text
 
     from echousd.cli.terminal import Terminal
 
@@ -42,9 +42,10 @@ def _show(findings: list[Diagnosis]) -> None:
     for heading in ("", "state", "found", "remedy"):
         table.add_column(heading, overflow="fold")
     for diagnosis in findings:
-        state = f"[{colours[diagnosis.state]}]{diagnosis.state}[/]"
-        table.add_row(diagnosis.name, state, escape(diagnosis.found), escape(diagnosis.remedy))
-    console = Terminal(markup=True)
+        table.add_row(
+            diagnosis.name, Text(diagnosis.state, colours[diagnosis.state]), diagnosis.found, diagnosis.remedy
+        )
+    console = Terminal()
     if not console.is_terminal:
         console.width = 200  # nobody's window: keep paths on one line
     console.print(table)

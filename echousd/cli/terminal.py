@@ -12,10 +12,10 @@ from echousd.cli.output import quiet, safe
 
 
 class Terminal(Console):
-    """A rich console of `safe` texts, cells of tables included, without markup unless it is asked for; or quiet."""
+    """A rich console of `safe` texts, cells of tables included, without markup; or quiet."""
 
-    def __init__(self, *, markup: bool = False, **options: Any) -> None:
-        super().__init__(markup=markup, highlight=False, quiet=quiet.get(), **options)
+    def __init__(self, **options: Any) -> None:
+        super().__init__(markup=False, highlight=False, quiet=quiet.get(), **options)
 
     def render_str(self, text: str, **options: Any) -> Text:
         """The text as rich shows it, without characters that a terminal obeys."""

@@ -10,9 +10,8 @@ import numpy as np
 import shapely
 import torch
 from scipy.optimize import linear_sum_assignment
-from torch import nn
 
-from echomodel.compact.modules import EchoLayer
+from echomodel.compact.modules import EchoLayer, silence
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch, GraphEdit
 from echomodel.loading import load_model
@@ -163,8 +162,7 @@ def muted_model() -> EchoModel:
     model = EchoModel.load()
     for layer in model.model.layout.modules():
         if isinstance(layer, EchoLayer):
-            nn.init.zeros_(layer.message.weight)
-            nn.init.zeros_(layer.message.bias)
+            silence(layer.message)
     return model
 
 

@@ -41,13 +41,9 @@ class Room(RoomData):
                 full; nothing is half-written.
         """
         from echousd.folder.folder import held
-        from echousd.make.save import save_layers, write_pictures
 
         with held(Path(folder), wait=wait):
-            root = save_layers(self, Path(folder), force=force, store=store)
-            if self.options.preview if preview is None else preview:
-                write_pictures(root)
-            return root
+            return write_room(self, Path(folder), StageTimer(), force=force, store=store, preview=preview).root
 
     @cached_property
     def stage(self) -> Usd.Stage:
@@ -89,8 +85,8 @@ class Written:
 
 
 def write_room(
-    room: Room, output: Path, timer: StageTimer, *, flat: bool = False, force: bool = False, store: Path | None = None,
-    preview: bool | None = None,
+    room: Room, output: Path, timer: StageTimer, *, flat: bool = False, force: bool = False,
+    store: str | Path | None = None, preview: bool | None = None,
 ) -> Written:  # fmt: skip
     """Write a room as layers with pictures, or as one flat file without; raises ValueError, see `Room.save`."""
     from echousd.make.save import save_layers, write_pictures

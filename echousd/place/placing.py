@@ -68,9 +68,8 @@ class PlacedBoxes:
 
 
 def place(
-    graph: SceneGraph, boxes: Boxes, *, rules: str = "strict", config: PlaceConfig | None = None,
-    begun: dict[bytes, Arranged] | None = None,
-) -> PlacedBoxes:  # fmt: skip
+    graph: SceneGraph, boxes: Boxes, *, config: PlaceConfig | None = None, begun: dict[bytes, Arranged] | None = None
+) -> PlacedBoxes:
     """Place the sampled boxes of a graph: see `place_boxes`.
 
     Nodes that are locked or have a position stay where they are, nodes with a size keep it, nodes with a yaw keep it.
@@ -78,7 +77,6 @@ def place(
     Arguments:
         graph: the graph that the boxes were sampled for.
         boxes: N boxes in the order of its nodes, metres and radians, in the frame of the room's floor.
-        rules: `strict` or `sgfront`.
 
     Raises:
         ValueError: as `place_boxes`, or another number of boxes than nodes.
@@ -92,8 +90,7 @@ def place(
         openings=graph.room.openings, stated=stated_placements(graph),
         fixed=np.array([node.locked or node.position is not None for node in nodes]),
         rigid=np.array([node.locked or node.size is not None for node in nodes]),
-        turned=np.array([node.locked or node.yaw is not None for node in nodes]), rules=rules, config=config,
-        begun=begun,
+        turned=np.array([node.locked or node.yaw is not None for node in nodes]), config=config, begun=begun,
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from safetensors.torch import load_file, save_file
 from torch import Tensor
 
 from echomodel.files import cache_folder, whole_file
+from echomodel.late import extra
 
 PUBLISHED_MODEL, PUBLISHED_WEIGHTS = "ViT-B-32-quickgelu", "openai"  # OpenAI's ViT-B/32 was trained with the quick GELU
 
@@ -75,11 +76,7 @@ class ClipTextEncoder:
     def model(self) -> torch.nn.Module:
         """Both towers; raises TextEncoderError if package or weights are absent."""
         try:
-            import open_clip
-        except ImportError:
-            raise TextEncoderError(
-                "text features need the package open_clip_torch: pip install 'echousd[text]'"
-            ) from None
+            open_clip = extra("open_clip", "text features need the package open_clip_torch", "text", TextEncoderError)
         except (RuntimeError, AttributeError, OSError) as error:  # torchvision's operators are of another torch
             reason = (str(error).strip() or type(error).__name__).splitlines()[0][:200]
             raise TextEncoderError(

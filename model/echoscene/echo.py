@@ -85,9 +85,7 @@ class ReleasedEcho:
         Raises ValueError for no layout branch, no box statistics, too many steps, a category without a class, or no
         text features.
         """
-        by = Sampling(**how)
-        assert not isinstance(by.generator, SceneGenerators)  # scenes of their own seeds are for compact weights
-        whole, change, objects = self._asked(graph, by.edit)
+        by, whole, change, objects = self._asked(graph, how)
         boxes = self.model.sample_layout(
             whole, generator=by.generator, steps=by.steps, change=change, progress=by.progress
         )[objects]
@@ -107,9 +105,7 @@ class ReleasedEcho:
         Returns (N, R, R, R) float32, negative inside, in the published unit cube: stretch the mesh to its box.
         Raises ValueError for no shape branch, a category without a class, or no text features.
         """
-        by = Sampling(**how)
-        assert not isinstance(by.generator, SceneGenerators)  # scenes of their own seeds are for compact weights
-        whole, change, objects = self._asked(graph, by.edit)
+        by, whole, change, objects = self._asked(graph, how)
         latents = self.model.sample_shapes(
             whole, generator=by.generator, steps=by.steps or 100, change=change, progress=by.progress
         )[objects]
@@ -146,15 +142,19 @@ class ReleasedEcho:
             raise ValueError(f"this model has no class for {', '.join(missing)}; allowed: {', '.join(sorted(known))}")
         return [found[number] for number in graph.category.tolist()]
 
-    def _asked(self, graph: GraphBatch, edit: GraphEdit | None) -> tuple[SceneGraphTensors, GraphChange | None, Tensor]:
-        """All scenes as the model takes them, the edit, and (M,) bool which nodes are objects; made on the CPU."""
+    def _asked(
+        self, graph: GraphBatch, how: dict[str, Any]
+    ) -> tuple[Sampling, SceneGraphTensors, GraphChange | None, Tensor]:
+        """How to sample, all scenes as the model takes them, the edit, and (M,) bool which nodes are objects."""
+        by = Sampling(**how)
+        assert not isinstance(by.generator, SceneGenerators)  # scenes of their own seeds are for compact weights
         graph = in_published_words(graph.to("cpu"))
         scenes, objects = self._scenes(graph)
         change = None
-        if edit is not None:
-            there = replace(edit, before=on_device(edit.before, "cpu"), added=on_device(edit.added, "cpu"))
+        if by.edit is not None:
+            there = replace(by.edit, before=on_device(by.edit.before, "cpu"), added=on_device(by.edit.added, "cpu"))
             change = self._change(graph, scenes, there)
-        return pack_scenes(scenes)[0], change, objects.to(self.model.device)
+        return by, pack_scenes(scenes)[0], change, objects.to(self.model.device)
 
     def _scenes(self, graph: GraphBatch) -> tuple[list[SceneGraphTensors], Tensor]:
         """Each scene with its floor and `_scene_` nodes, and which nodes of all of them are objects, (M,) bool."""

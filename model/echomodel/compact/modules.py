@@ -29,6 +29,12 @@ class WordTable(nn.Embedding):
         return super().forward(places(self.kind, self.names, input))
 
 
+def silence(*layers: nn.Module) -> None:
+    """Have layers begin with nothing to say: weights and biases of zeros."""
+    for value in (value for layer in layers for value in layer.parameters()):
+        nn.init.zeros_(value)
+
+
 class EchoLayer(Echo, nn.Module):
     """An echo.
 
@@ -115,9 +121,7 @@ class LayoutDenoiser(Layout, nn.Module):
         for table in (self.category, self.room_type, self.rules):
             nn.init.normal_(table.weight, std=0.3)
         nn.init.zeros_(self.tidy.weight)
-        for layer in (self.modulation, self.opening[-1], *self.heads):  # type: ignore[assignment]
-            nn.init.zeros_(layer.weight)
-            nn.init.zeros_(layer.bias)
+        silence(self.modulation, self.opening[-1], *self.heads)
 
 
 class FurnitureDenoiser(Furniture, nn.Module):
@@ -145,6 +149,4 @@ class FurnitureDenoiser(Furniture, nn.Module):
         self.head = nn.Linear(width, values)
         for table in (self.category, self.room_type):
             nn.init.normal_(table.weight, std=0.3)
-        for layer in (self.modulation, self.head):
-            nn.init.zeros_(layer.weight)
-            nn.init.zeros_(layer.bias)
+        silence(self.modulation, self.head)

@@ -16,7 +16,7 @@ from torch import Tensor, nn
 
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import seen
-from echomodel.compact.modules import EchoLayer, WordTable
+from echomodel.compact.modules import EchoLayer, WordTable, silence
 from echomodel.compact.pairs import Pairs, level_features, pairs_of
 from echomodel.compact.sampling import CompactSampling, Latent, agreeing, group_means
 from echomodel.config import CompactConfig
@@ -175,8 +175,7 @@ class ShapeDenoiser(nn.Module):
         self.scale_shift = nn.Linear(width, 2 * width)
         self.head = nn.Parameter(torch.zeros(shape.tokens, width, values))
         nn.init.normal_(self.category.weight, std=0.3)
-        nn.init.zeros_(self.scale_shift.weight)
-        nn.init.zeros_(self.scale_shift.bias)
+        silence(self.scale_shift)
 
     mean: Tensor
     basis: Tensor
@@ -263,8 +262,7 @@ class _Block(nn.Module):
         self.cross_kv = nn.Linear(width, 2 * width)
         self.cross_out = nn.Linear(width, width)
         self.mlp = nn.Sequential(nn.Linear(width, 4 * width), nn.GELU(approximate="tanh"), nn.Linear(4 * width, width))
-        nn.init.zeros_(self.modulation.weight)
-        nn.init.zeros_(self.modulation.bias)
+        silence(self.modulation)
 
     def forward(self, h: Tensor, condition: Tensor, sources: Tensor) -> Tensor:
         scale_a, shift_a, gate_a, scale_m, shift_m, gate_m = self.modulation(condition)[:, None].chunk(6, dim=2)
