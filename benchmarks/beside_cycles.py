@@ -23,8 +23,8 @@ from room_sheets import drawn_by_lot, graphs_of
 
 from echousd import generate
 from echousd.draw import tracing
-from echousd.draw.indoors import LUMA, SUN, Bounced, with_ceiling
-from echousd.draw.scenery import Scenery, read_scenery
+from echousd.draw.indoors import LUMA, SUN, Bounced
+from echousd.draw.scenery import Scenery, read_scenery, with_ceiling
 from echousd.draw.views import View, hero_view
 from echousd.options import RoomOptions
 

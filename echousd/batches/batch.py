@@ -350,20 +350,18 @@ class Run:
                 self.stopped = f"{self.folder}: {FULL.lower()}; make room and go on with --resume"
             self._fail(entry, outcome.error, progress)
             return
-        row = {"room": entry.id, "state": "done", "when": round(time.time(), 3), **outcome.value}
-        if self._write(row):
+        if self._write(entry, "done", outcome.value):
             progress.done, progress.made = progress.done + 1, progress.made + 1
             progress.room, progress.error = entry.id, ""
 
     def _fail(self, entry: Entry, error: str, progress: BatchProgress) -> None:
-        row = {"room": entry.id, "state": "failed", "when": round(time.time(), 3), "error": error[:2000]}
-        if self._write(row):
+        if self._write(entry, "failed", {"error": error[:2000]}):
             progress.failed += 1
             progress.room, progress.error = entry.id, error
 
-    def _write(self, row: dict[str, Any]) -> bool:
+    def _write(self, entry: Entry, state: str, found: dict[str, Any]) -> bool:
         try:
-            self.journal.append(row)
+            self.journal.append({"room": entry.id, "state": state, "when": round(time.time(), 3), **found})
         except OSError as error:
             self.stopped = f"{self.journal.path}: {(error.strerror or str(error)).lower()}; go on with --resume"
             return False

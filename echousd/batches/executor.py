@@ -144,17 +144,15 @@ class LocalWorkers:
         mine, its = self._context.Pipe()
         process = self._context.Process(target=_serve, args=(its, os.getpid()), daemon=True)
         own = ONE_CORE | environment
-        before = {name: os.environ.get(name) for name in own}
+        before = {name: os.environ[name] for name in own if name in os.environ}
         os.environ.update(own)
         try:
             with without_script():
                 process.start()
         finally:
-            for name, value in before.items():
-                if value is None:
-                    del os.environ[name]
-                else:
-                    os.environ[name] = value
+            for name in own.keys() - before.keys():
+                del os.environ[name]
+            os.environ.update(before)
         its.close()
         return _Worker(process, mine, environment)
 

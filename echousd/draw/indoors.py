@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pxr import Usd, UsdGeom, UsdLux
@@ -16,13 +15,9 @@ from echousd.stage.lights import SHARES, emitted, level_size
 from echousd.stage.units import to_metres
 from echousd.stage.values import NOW
 
-if TYPE_CHECKING:
-    from echousd.draw.scenery import Scenery
-
 # Of what is told of the sun, by colour, as Blender has it: eyes see it brighter than a camera in the room would bear,
 # and pictures of rooms have it warmer than the light of the sky.
 SUN = 4 * np.array([1.12, 1.0, 0.78], np.float32)
-CEILING = np.array([0.87, 0.86, 0.84], np.float32)
 # What is seen through windows is exposed for itself, as photographers of interiors blend it in: how bright by day, the
 # power of the sky's light by which it is less in the evening, and haze before it.
 THERE, DUSK, VEIL = 2.5, 0.5, 0.03
@@ -160,25 +155,6 @@ def _spots(bulb: np.ndarray, shades: Sequence[np.ndarray]) -> np.ndarray:
             area = np.linalg.norm(area_normals(triangles), axis=1).cumsum()
             spots, nearest = middle[np.searchsorted(area, area[-1] * (np.arange(SPOTS) + 0.5) / SPOTS)], away
     return spots
-
-
-def with_ceiling(scenery: Scenery) -> Scenery:
-    """The scene with a ceiling over its walls, and its beams; where it has none, in the light that it would be told."""
-    (left, _, back), (right, _, front) = scenery.bounds
-    y = scenery.triangles[scenery.wall >= 0][..., 1].max()
-    corners = np.array([(left, y, back), (right, y, back), (right, y, front), (left, y, front)], np.float32)
-    added: dict[str, Any] = {
-        "triangles": corners[[[0, 1, 2], [0, 2, 3]]],
-        "normals": np.broadcast_to(np.array([0, -1, 0], np.float32), (2, 3, 3)),
-        "flat_colors": np.broadcast_to(CEILING, (2, 3)), "emissive": np.zeros((2, 3), np.float32),
-        "gloss": np.zeros(2, np.float32), "thin": np.zeros(2, np.float32), "st": np.zeros((2, 3, 2), np.float32),
-        "texture": np.full((2, 2), -1),
-        "wall": np.full(2, -1),
-    }  # fmt: skip
-    parts = [{key: getattr(scenery, key) for key in added}, *scenery.above, added]
-    joined: dict[str, Any] = {key: np.concatenate([part[key] for part in parts]) for key in added}
-    lights = scenery.lights if scenery.roofed else scenery.lights.below_ceiling()
-    return replace(scenery, above=(), lights=lights, **joined)
 
 
 def evened(light: np.ndarray, white: np.ndarray, inside: bool = True) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,8 +24,15 @@ class RenderUnavailable(ImportError, ValueError):
     """Embree is not installed; the message says how to get it."""
 
 
-def embree(triangles: np.ndarray) -> Any:
-    """The tree of Embree of triangles (f, 3, 3), which rays are run through; raises RenderUnavailable without it."""
+class Tree(NamedTuple):
+    """Triangles as Embree keeps them, for rays to run through, and a thread for half of many rays."""
+
+    scene: Any
+    beside: ThreadPoolExecutor
+
+
+def embree(triangles: np.ndarray) -> Tree:
+    """The tree of triangles (f, 3, 3); raises RenderUnavailable without Embree."""
     try:
         from embreex import rtcore_scene
         from embreex.mesh_construction import TriangleMesh
@@ -33,7 +41,7 @@ def embree(triangles: np.ndarray) -> Any:
     scene = rtcore_scene.EmbreeScene()
     TriangleMesh(scene, np.ascontiguousarray(triangles, np.float32))
     scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))  # which builds it: no two threads shall
-    return scene
+    return Tree(scene, ThreadPoolExecutor(1))
 
 
 class World(NamedTuple):
@@ -41,7 +49,7 @@ class World(NamedTuple):
     thrown back, what the sun gives to what faces it, whether the picture is fine, how much brighter shades are than
     told, and the mean light, by colour; and the images as they are seen."""
 
-    scene: Any
+    tree: Tree
     scenery: Scenery
     view: View
     size: int
@@ -108,7 +116,7 @@ def first_hit(world: World, origin: np.ndarray, way: np.ndarray) -> tuple[np.nda
     """What Embree says of rays (3, n): faces (n,), -1 for none, metres to them, 0 to none, and places between their
     corners (2, n)."""
     origin, way = _rows(origin), _rows(way)
-    hits = _shared(len(way), lambda here: world.scene.run(origin[here], way[here], output=1))
+    hits = _shared(world.tree, len(way), lambda tree, at: tree.run(origin[at], way[at], output=1))
     face, far, *bary = (np.concatenate([hit[what] for hit in hits]) for what in ("primID", "tfar", "u", "v"))
     met = face >= 0
     return face, np.where(met, far, np.float32(0)), np.where(met, bary, np.float32(0))
@@ -121,22 +129,21 @@ def way_to(point: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return way / away, away
 
 
-def free(scene: Any, point: np.ndarray, way: np.ndarray, away: np.ndarray, asked: np.ndarray) -> np.ndarray:
+def free(tree: Tree, point: np.ndarray, way: np.ndarray, away: np.ndarray, asked: np.ndarray) -> np.ndarray:
     """(n,) float32: 1 if nothing stands within `away` metres in a direction (3, n), 0 elsewhere or if not `asked`."""
     out, ask = (asked & (away <= 0.02)).astype(np.float32), np.flatnonzero(asked & (away > 0.02))
     far = np.ascontiguousarray(away[ask] - 0.01, np.float32)
     origin, way = _rows(point.take(ask, 1)), _rows(way.take(ask, 1))
-    hits = _shared(len(ask), lambda at: scene.run(origin[at], way[at], dists=far[at], query="OCCLUDED"))
+    hits = _shared(tree, len(ask), lambda tree, at: tree.run(origin[at], way[at], dists=far[at], query="OCCLUDED"))
     out[ask] = np.concatenate(hits) != 0
     return out
 
 
-def _shared(many: int, run: Callable[[slice], Any]) -> list[Any]:
+def _shared(tree: Tree, many: int, run: Callable[[Any, slice], Any]) -> list[Any]:
     """What so many rays meet, in their order; from `SHARED` on half of them run beside the others."""
     half = many // 2 if many >= SHARED else 0
-    with ThreadPoolExecutor(1) as beside:
-        first = beside.map(run, [slice(half)] if half else [])
-        rest = run(slice(half, many))
+    first = tree.beside.map(partial(run, tree.scene), [slice(half)] if half else [])
+    rest = run(tree.scene, slice(half, many))
     return [*first, rest]
 
 

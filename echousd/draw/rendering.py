@@ -7,8 +7,7 @@ from PIL import Image
 from pxr import Usd
 
 from echomodel.late import Late
-from echousd.draw.indoors import with_ceiling
-from echousd.draw.scenery import Scenery, read_scenery
+from echousd.draw.scenery import Scenery, read_scenery, with_ceiling
 from echousd.draw.tracing import FINE, QUICK, trace
 from echousd.draw.views import View, hero_view, stage_views
 from echousd.stage.values import reading

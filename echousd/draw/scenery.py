@@ -2,7 +2,7 @@
 
 import colorsys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial
 from typing import Any, NamedTuple
 
@@ -30,6 +30,7 @@ SEEN_THROUGH, GLAZED = 0.5, 0.03
 NEXT, NEAR, FAR = 2.5, 1.2, 0.6  # metres from a passage to the wall beyond, and what light there is on the way to it
 CLOTH, SHEER = 0.22, 1.25  # the share of light that comes through cloth, and how much more through thin cloth
 HANGING = {"curtain": CLOTH, "blind": 0.08}  # of blinds, which are closer: they would be blank where it is bright
+CEILING = np.array([0.87, 0.86, 0.84], np.float32)
 SKY_LIGHT = np.array([0.90, 0.93, 0.97], np.float32)
 BACKGROUND = np.array([0.90, 0.905, 0.915], np.float32) ** 2.2
 HUNG = (  # goes with its wall
@@ -98,7 +99,9 @@ class Scenery:
     @cached_property
     def texels(self) -> np.ndarray:
         """(f,) float32, pixels of its image that a metre of each face has."""
-        sizes = 2 * np.array([read(1).shape[1::-1] for read, _ in self.images] or [(1, 1)], np.float32)
+        sizes = np.ones((len(self.images) + 1, 2), np.float32)  # none for faces without an image: the last
+        for number in {*self.texture[:, COLOR].tolist()} - {-1}:  # relief is laid out as its colours are
+            sizes[number] = 2 * np.array(self.images[number][0](1).shape[1::-1])
         flat = np.diff(self.st, axis=1) * sizes[self.texture[:, COLOR]][:, None]
         area = lengths(area_normals(self.triangles))
         pixels = np.abs(flat[:, 0, 0] * flat[:, 1, 1] - flat[:, 0, 1] * flat[:, 1, 0])
@@ -111,20 +114,21 @@ class Scenery:
         In one row: (3, n) uint8 pixels; (3, images * `LEVELS`) int, the first of each, its width and height; and
         (3, images) float32, what each's linear RGB is multiplied by.
         """
-        number = self.texture[:, : RELIEF + fine].T.take(face, 1)
+        used = self.texture[:, : RELIEF + fine].T
+        number = used.take(face, 1)
         place = self._halved(number, face, breadth)[number >= 0]
         asked = np.bincount(place, minlength=len(self.images) * LEVELS).reshape(-1, LEVELS) > 0
-        pixels, places, first = [np.zeros((0, 3), np.uint8)], list[tuple[int, int, int]](), 0
-        for (read, _), levels in zip(self.images, asked, strict=True):
-            finest = int(levels.argmax()) if levels.any() else LEVELS - 1
-            shown = Image.fromarray(read(min(finest, 1))).reduce(2 ** max(finest - 1, 0))
+        pixels, places, first = [np.zeros((0, 3), np.uint8)], np.zeros((*asked.shape, 3), int), 0
+        for image in sorted({*used.ravel().tolist()} - {-1}):
+            finest = int(asked[image].argmax()) if asked[image].any() else LEVELS - 1
+            shown = Image.fromarray(self.images[image][0](min(finest, 1))).reduce(2 ** max(finest - 1, 0))
             for level in range(LEVELS):
-                places.append((first, *shown.size))
+                places[image, level] = first, *shown.size
                 if level >= finest:
                     pixels.append(np.asarray(shown).reshape(-1, 3))
                     first, shown = first + len(pixels[-1]), shown.reduce(2)
         tints = np.array([tint for _, tint in self.images], np.float32)
-        tables = (each.reshape(-1, 3).T for each in (np.concatenate(pixels), np.array(places, int), tints))
+        tables = (each.reshape(-1, 3).T for each in (np.concatenate(pixels), places, tints))
         return tuple(map(np.ascontiguousarray, tables))
 
     def _halved(self, number: np.ndarray, face: np.ndarray, breadth: np.ndarray) -> np.ndarray:
@@ -248,6 +252,7 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
     """
     parts: list[dict[str, np.ndarray]] = []
     images: dict[tuple, tuple[Callable[[int], np.ndarray], np.ndarray]] = {}
+    files: dict[str, Callable[[int], np.ndarray]] = {}  # of these
     means: dict[tuple, np.ndarray] = {}  # colours of these
     things = list[tuple[bool, np.ndarray, np.ndarray, np.ndarray]]()
     shades: dict[str, list[np.ndarray]] = {}  # by component
@@ -269,14 +274,8 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
         count = len(mesh.triangles)
         turned = mesh.normals.reshape(-1, 3) @ np.linalg.inv(mesh.world[:3, :3])  # inverse transpose, as rows
         turned = turned / np.maximum(lengths(turned), 1e-12)[:, None]
-        part = {
-            "triangles": points.reshape(-1, 3, 3).astype(np.float32),
-            "normals": turned.reshape(-1, 3, 3).astype(np.float32),
-            "st": np.zeros((count, 3, 2), np.float32) if mesh.st is None else mesh.st.astype(np.float32),
-            "flat_colors": np.zeros((count, 3), np.float32), "emissive": np.zeros((count, 3), np.float32),
-            "gloss": np.zeros(count, np.float32), "thin": np.full(count, HANGING.get(mesh.category, 0.0), "f4"),
-            "texture": np.full((count, 2), -1), "wall": np.full(count, walls.get(mesh.component, -1)),
-        }  # fmt: skip
+        part = plain_faces(points.reshape(-1, 3, 3), turned.reshape(-1, 3, 3), wall=walls.get(mesh.component, -1))
+        part["thin"][:], part["st"][:] = HANGING.get(mesh.category, 0.0), 0 if mesh.st is None else mesh.st
         plain, clear = Paint(color=class_color(mesh.category), roughness=1.0), np.zeros(count, bool)
         for paint, faces in ((plain, np.arange(count)),) if by_class else mesh.paints:
             part["flat_colors"][faces], part["emissive"][faces] = paint.color, paint.emissive
@@ -284,8 +283,9 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
             part["texture"][faces], clear[faces] = (-1, -1), paint.opacity < SEEN_THROUGH
             part["thin"][faces] *= SHEER if paint.opacity < 1 else 1
             if paint.texture:
-                key, found = (paint.texture, paint.tint), cache(partial(image_of, paint.image, paint.texture))
-                read, tint = images.setdefault(key, (found, np.array(paint.tint, np.float32)))
+                found = cache(partial(image_of, paint.image, paint.texture))
+                key, read = (paint.texture, paint.tint), files.setdefault(paint.texture, found)
+                _, tint = images.setdefault(key, (read, np.array(paint.tint, np.float32)))
                 part["texture"][faces, COLOR] = [*images].index(key)
                 # most images are seen in half their size at most, in which a JPEG is read in half of the time
                 if key not in means:
@@ -320,6 +320,29 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
         lights=read_lights(stage, [np.concatenate(each) for each in shades.values()]),
         roofed=roofed, above=tuple(above), **joined,
     )  # fmt: skip
+
+
+def with_ceiling(scenery: Scenery) -> Scenery:
+    """The scene with a ceiling over its walls, and its beams; where it has none, in the light that it would be told."""
+    (left, _, back), (right, _, front) = scenery.bounds
+    y = scenery.triangles[scenery.wall >= 0][..., 1].max()
+    corners = np.array([(left, y, back), (right, y, back), (right, y, front), (left, y, front)], np.float32)
+    added = plain_faces(corners[[[0, 1, 2], [0, 2, 3]]], np.broadcast_to(np.array([0, -1, 0]), (2, 3, 3)), CEILING)
+    parts = [{key: getattr(scenery, key) for key in added}, *scenery.above, added]
+    joined: dict[str, Any] = {key: np.concatenate([part[key] for part in parts]) for key in added}
+    lights = scenery.lights if scenery.roofed else scenery.lights.below_ceiling()
+    return replace(scenery, above=(), lights=lights, **joined)
+
+
+def plain_faces(triangles: np.ndarray, normals: np.ndarray, color: Any = 0, wall: int = -1) -> dict[str, np.ndarray]:
+    """The fields of a scenery with an f, of faces without images; arguments as there, one colour and wall for all."""
+    size, kind = len(triangles), np.float32
+    return {
+        "triangles": triangles.astype(kind), "normals": normals.astype(kind), "st": np.zeros((size, 3, 2), kind),
+        "flat_colors": np.full((size, 3), color, kind), "emissive": np.zeros((size, 3), kind),
+        "gloss": np.zeros(size, kind), "thin": np.zeros(size, kind), "texture": np.full((size, 2), -1),
+        "wall": np.full(size, wall),
+    }  # fmt: skip
 
 
 def _pane(points: np.ndarray) -> np.ndarray:

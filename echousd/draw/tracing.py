@@ -393,7 +393,7 @@ def _direct(
 
     `spot`, `turn`: (2, n) in [0, 1), which place in which window and lamp is asked.
     """
-    scene, scenery, lights = world.scene, world.scenery, world.scenery.lights
+    scenery, lights = world.scenery, world.scenery.lights
     light, inside = np.zeros((world.rows - 2, point.shape[1]), np.float32), world.view.inside
     panes, panels = scenery.panes.reshape(-1, 9).T, lights.panels.reshape(-1, 12).T
     for flat in (panes, panels) if inside else ():  # one place in one window and in one panel for each ray
@@ -405,7 +405,7 @@ def _direct(
         outwards = along(way, np.cross(plane[3:6], plane[6:9], axis=0))  # for a quarter of its area
         outwards = np.abs(outwards) if flat is panes else np.maximum(outwards, 0)
         seen = np.clip(along(way, normal), 0, None) * 4 * outwards / np.maximum(away, 0.2) ** 2
-        share = free(scene, point, way, away, seen > 1e-4) * np.minimum(seen, 1.5)  # none a spark near a pane
+        share = free(world.tree, point, way, away, seen > 1e-4) * np.minimum(seen, 1.5)  # none a spark near a pane
         share = share * np.float32(many / np.pi) * (lights.from_sky(way) if flat is panes else plane[9:])
         light += slanted(share, way, normal) if world.fine else share
     if inside and len(lights.bulbs):  # one lamp for each ray
@@ -413,7 +413,7 @@ def _direct(
         way, away = way_to(point, lights.bulbs[which, (spot[0] * lights.bulbs.shape[1]).astype(int)].T)
         facing = np.clip(along(normal, way), 0, None) * len(lights.bulbs) / (away**2 + OWN**2)
         own = np.maximum(OWN, np.ptp(lights.bulbs, axis=1).max(-1))[which]  # what is so near is its shade
-        lit = free(scene, point, way, away - own, facing > 0) * facing / np.float32(np.pi)
+        lit = free(world.tree, point, way, away - own, facing > 0) * facing / np.float32(np.pi)
         share = lit * lights.shining.T.take(which, 1)
         light += slanted(share, way, normal) if world.fine else share
     return light, _sunny(world, point, normal, spot)
@@ -426,7 +426,7 @@ def _sunny(world: World, point: np.ndarray, normal: np.ndarray, spot: np.ndarray
         return np.zeros(point.shape[1], np.float32)
     towards = unit(world.towards + np.float32(0.005 if inside else SUN_SPREAD) * on_sphere(spot))
     facing = np.clip(along(normal, towards), 0, None)
-    return free(world.scene, point, towards, np.full(len(facing), 1e3, np.float32), facing > 0) * facing
+    return free(world.tree, point, towards, np.full(len(facing), 1e3, np.float32), facing > 0) * facing
 
 
 def _fallen(world: World, *at: np.ndarray) -> np.ndarray:

@@ -58,7 +58,7 @@ def visible_shares(
 ) -> list[float] | None:
     """For every object the share of its texels that a camera sees past all others; None where Embree is missing."""
     try:
-        scene = embree(np.concatenate([t.triangles for t in objects]))
+        tree = embree(np.concatenate([t.triangles for t in objects]))
     except RenderUnavailable:
         return None
     shares = []
@@ -74,7 +74,7 @@ def visible_shares(
                 continue
             way, away = way_to(points[ask].T, matrix[:3, 3:])
             side = np.where((way * normals[ask].T).sum(0) < 0, -1.0, 1.0)
-            seen[ask] = free(scene, points[ask].T + 1e-3 * side * normals[ask].T, way, away, away > 0) > 0
+            seen[ask] = free(tree, points[ask].T + 1e-3 * side * normals[ask].T, way, away, away > 0) > 0
         shares.append(float(seen.mean()) if len(seen) else 0.0)
     return shares
 

@@ -15,9 +15,9 @@ import echousd
 from echousd.draw import tracing
 from echousd.draw.drawables import image_of
 from echousd.draw.from_files import render
-from echousd.draw.indoors import BRIGHT, LUMA, SHARE, evened, exposure, read_lights, with_ceiling
+from echousd.draw.indoors import BRIGHT, LUMA, SHARE, evened, exposure, read_lights
 from echousd.draw.rendering import render_stage
-from echousd.draw.scenery import CLOTH, SHEER, read_scenery
+from echousd.draw.scenery import CLOTH, SHEER, read_scenery, with_ceiling
 from echousd.draw.tracing import trace
 from echousd.draw.views import View, hero_view, view_matrix
 from echousd.options import RoomOptions

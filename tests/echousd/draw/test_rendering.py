@@ -12,7 +12,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 from small_room import BARE, StandIn, small_graph
 
 import echousd
-from echousd.draw.drawables import read_drawables
+from echousd.draw.drawables import image_of, read_drawables
 from echousd.draw.from_files import render, render_turn
 from echousd.draw.indoors import LUMA, Bounced
 from echousd.draw.outside import turning_views, without_near_walls
@@ -295,6 +295,23 @@ def test_a_small_picture_is_quick(root):
     started = time.process_time()
     render_stage(stage, size=256)
     assert time.process_time() - started < 3.0  # 0.7 s on an idle core
+
+
+def test_each_image_is_read_once_in_a_size_and_relief_for_fine_pictures_alone(tmp_path, monkeypatch):
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, dress="none")
+    root, read = room.save(tmp_path / "bedroom", preview=False), []
+
+    def counted(prim, file, halved=0):
+        read.append((file, halved))
+        return image_of(prim, file, halved)
+
+    monkeypatch.setattr("echousd.draw.scenery.image_of", counted)
+    for rays in (2, 3):
+        read.clear()
+        render_stage(Usd.Stage.Open(str(root)), size=64, rays=rays)
+        colors = [one for one in read if "normal" not in one[0]]
+        assert len(set(colors)) == len(colors) > 0
+        assert (colors != read) == (rays == 3)
 
 
 @pytest.mark.parametrize(

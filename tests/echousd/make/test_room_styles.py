@@ -8,8 +8,7 @@ import pytest
 import echousd
 from echomodel.boxes import Boxes
 from echomodel.vocabulary import vocabulary
-from echousd.draw.indoors import with_ceiling
-from echousd.draw.scenery import read_scenery
+from echousd.draw.scenery import read_scenery, with_ceiling
 from echousd.layers.structure import covered_walls, millwork, shell_prims
 from echousd.shapes.looks import palette_of_room
 
