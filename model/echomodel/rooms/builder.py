@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -214,6 +215,20 @@ class Builder:
         if near is not None:
             found.sort(key=lambda item: math.hypot(item.x - near.x, item.z - near.z))
         return self.add(found[0], style)
+
+    def along_walls(self, *categories: str, **how: Any) -> None:
+        """Place all that are wanted of some categories `against_wall`."""
+        for category in categories:
+            for _ in range(self.take(category)):
+                self.against_wall(category, **how)
+
+    def at_wall(
+        self, category: str, size: Size, wall: Wall, along: float, gap: float, style: int, *, turn: float = 0.0,
+        play: float = 0.02,
+    ) -> Item | None:  # fmt: skip
+        """Place one item at a place along a wall, its back `gap` metres off it, if that is free."""
+        x, z = wall.point(along, size[2] / 2 + gap)
+        return self.put(category, size, x, z, wall.yaw + turn, style, play=play)
 
     def wall_gap(self, category: str) -> float:
         """Gap between a back and its wall: a few centimetres, as such furniture of real rooms has."""

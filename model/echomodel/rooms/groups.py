@@ -30,9 +30,7 @@ def television(room: Builder, anchor: Item, nearest: float = 0.3, farthest: floa
             spread = 0.1 if attempt == 0 else 0.15 * attempt
             place = along + room.rng.normal(0.0, spread)
             place = min(max(place, size[0] / 2), max(wall.length - size[0] / 2, size[0] / 2))
-            px, pz = wall.point(place, size[2] / 2 + room.wall_gap("tv_stand"))
-            placed = room.put("tv_stand", size, px, pz, wall.yaw, style)
-            if placed:
+            if placed := room.at_wall("tv_stand", size, wall, place, room.wall_gap("tv_stand"), style):
                 return placed
         size = (size[0] * 0.85, size[1], size[2])
     return None
@@ -64,9 +62,7 @@ def sofa_group(room: Builder, category: str) -> Item | None:
             continue
         if wants_tv and distance > 4.8 and pulled:  # then the sofa comes towards its television
             gap = max(min(distance - size[2] / 2 - room.uniform(2.9, 3.5), distance - 3.0), gap)
-        x, z = wall.point(along, size[2] / 2 + gap)
-        sofa = room.put(category, size, x, z, wall.yaw, style)
-        if sofa:
+        if sofa := room.at_wall(category, size, wall, along, gap, style):
             break
     if sofa is None:
         sofa = room.somewhere(category, size, style)
@@ -393,17 +389,14 @@ def bathroom(room: Builder) -> None:
                 if room.free(mirror):  # else the basin is under a window
                     room.add(mirror, style)
     for category in WALL_HUNG:
-        for _ in range(room.take(category)):
-            low = vocabulary().category(category).mounted
-            room.against_wall(category, corner=0.2, margin=0.1, gap=0.01, style=style, tries=20, low=low)
+        low = vocabulary().category(category).mounted
+        room.along_walls(category, corner=0.2, margin=0.1, gap=0.01, style=style, tries=20, low=low)
 
 
 def hallway(room: Builder) -> None:
     """Coats and shoes beside each other at one wall, a bench or console along another."""
     rack = room.against_wall("coat_rack", corner=0.3, gap=0.01) if room.take("coat_rack") else None
-    for category in ("shoe_cabinet", "bench", "console_table"):
-        for _ in range(room.take(category)):
-            room.against_wall(category, corner=0.2, gap=0.02, near=rack, tries=24)
+    room.along_walls("shoe_cabinet", "bench", "console_table", corner=0.2, gap=0.02, near=rack, tries=24)
 
 
 def balcony(room: Builder) -> None:
@@ -414,9 +407,7 @@ def balcony(room: Builder) -> None:
 
 def childrens_room(room: Builder) -> None:
     """A cot and toys at the walls, a small table with its chairs; the rest as in other bedrooms."""
-    for category in ("cot", "toy_box"):
-        for _ in range(room.take(category)):
-            room.against_wall(category, corner=0.5, gap=0.03)
+    room.along_walls("cot", "toy_box", corner=0.5, gap=0.03)
     for _ in range(room.take("kids_table")):
         dining_group(room, "kids_table", ("kids_chair",))
     room.take("kids_chair")

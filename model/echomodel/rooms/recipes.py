@@ -59,8 +59,7 @@ def bed_group(room: Builder, category: str) -> Item | None:
             continue
         if sides == 1:
             along += room.pick([-1, 1], [1, 1]) * stand[0] / 2
-        x, z = wall.point(along, size[2] / 2 + room.wall_gap(category))
-        bed = room.put(category, size, x, z, wall.yaw, style)
+        bed = room.at_wall(category, size, wall, along, room.wall_gap(category), style)
         if bed and _sides_kept_free(room, bed):
             break
         if bed:
@@ -198,20 +197,15 @@ def furnish(room: Builder, name: str) -> None:
 
 def _home(first: Callable[[Builder], None], room: Builder) -> Anchors:
     first(room)
-    _radiators(room)
+    room.along_walls("radiator", corner=0.1, gap=0.02)
     return list
-
-
-def _radiators(room: Builder) -> None:
-    for _ in range(room.take("radiator")):
-        room.against_wall("radiator", corner=0.1, gap=0.02)
 
 
 def _childrens_room(room: Builder) -> Anchors:
     beds = [bed for category in BEDS for _ in range(room.take(category)) if (bed := bed_group(room, category))]
     childrens_room(room)
     _wardrobe(room, beds[0] if beds else None)
-    _radiators(room)
+    room.along_walls("radiator", corner=0.1, gap=0.02)
     _desks(room)
     return lambda: list(beds)
 
@@ -259,9 +253,7 @@ def _beside_bed(room: Builder, bed: Item, size: tuple[float, float, float], styl
         if room.chance(0.5):
             along = min(ends, key=lambda end: abs(end - level))
         along = min(max(along, ends[0]), max(ends))
-        x, z = wall.point(along, size[2] / 2 + room.wall_gap("wardrobe"))
-        placed = room.put("wardrobe", size, x, z, wall.yaw, style)
-        if placed:
+        if placed := room.at_wall("wardrobe", size, wall, along, room.wall_gap("wardrobe"), style):
             return placed
     return None
 
@@ -395,8 +387,7 @@ def _by_the_wall(room: Builder, category: str) -> None:
         spot = room.wall_spot(size[0], 0.7)
         if spot is None:
             return
-        x, z = spot[0].point(spot[1], size[2] / 2 + abs(room.rng.normal(0.02, 0.08)))
-        if room.put(category, size, x, z, spot[0].yaw + turn, style):
+        if room.at_wall(category, size, *spot, abs(room.rng.normal(0.02, 0.08)), style, turn=turn):
             return
 
 
@@ -413,8 +404,7 @@ def _loose(room: Builder, category: str, size: tuple[float, float, float], style
             askew = category in LOUNGERS and not group and room.chance(0.45)
             turn = room.pick([-1, 1], [1, 1]) * room.uniform(0.3, 0.8) if askew else 0.0
             off = room.uniform(0.2, 0.9) if attempt < 5 else room.uniform(0.02, 0.1)  # seats stand in the room
-            x, z = spot[0].point(spot[1], size[2] / 2 + (max(off, 0.2) if askew else off))
-            if room.put(category, size, x, z, spot[0].yaw + turn, style, play=0.0):
+            if room.at_wall(category, size, *spot, max(off, 0.2) if askew else off, style, turn=turn, play=0.0):
                 return
     if not (group and category in LOUNGERS):
         room.somewhere(category, size, style)
@@ -464,9 +454,7 @@ def _bed_pendants(room: Builder, bed: Item, count: int) -> None:
             x, z = bed.local(room.rng.normal(0.0, 0.3), forward + room.rng.normal(0.0, 0.2))
             _hang(room, "pendant_lamp", size, x, z, _turn(room, None))
     elif count >= 2:
-        size = room.size("pendant_lamp")
-        shrink = min(1.0, 0.45 / max(size[0], size[2]))
-        size = (size[0] * shrink, size[1], size[2] * shrink)
+        size = _narrow(room.size("pendant_lamp"), 0.45)
         lateral, forward = bed.size[0] / 2 + 0.25, -bed.size[2] / 2 + 0.22
         for item in room.items:
             if item.category == "nightstand":
@@ -479,10 +467,14 @@ def _bed_pendants(room: Builder, bed: Item, count: int) -> None:
             _hang(room, "pendant_lamp", size, x, z, bed.yaw, style, low=0.3)
 
 
+def _narrow(size: Size, most: float) -> Size:
+    """A size at most so many metres across."""
+    shrink = min(1.0, most / max(size[0], size[2]))
+    return size[0] * shrink, size[1], size[2] * shrink
+
+
 def _row(room: Builder, table: Item, count: int) -> None:
-    size = room.size("pendant_lamp")
-    shrink = min(1.0, 0.35 / max(size[0], size[2]))
-    size = (size[0] * shrink, size[1], size[2] * shrink)
+    size = _narrow(room.size("pendant_lamp"), 0.35)
     style, step = room.style(), table.size[0] * room.uniform(0.22, 0.32)
     across = room.rng.normal(0.0, 0.05)
     for k in range(count):
