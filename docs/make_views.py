@@ -44,9 +44,11 @@ from echousd.draw.rays import embree
 from echousd.srgb import from_linear
 
 FOLDER = Path(__file__).parents[1] / "echousd/shapes/finishes/views"
-WIDE = 2048  # pixels around
+WIDE = 4096  # pixels around
 BAND = (52.0, -42.0)  # degrees of elevation between which anything but sky and ground is
-RAYS, QUALITY = 3, 78  # per pixel; of JPEG
+RAYS, QUALITY = 4, 55  # per pixel; of JPEG
+# How much less coloured than light is: through glass and haze; how bright half of what lies about the horizon is.
+PALER, ABOUT = 0.12, 0.11
 SOFT = 0.8  # pixels, so that near a window none is seen: what lies around is never quite in focus indoors
 SUNNY, FAR = np.array([1.55, 1.42, 1.20]), 2600.0  # what the sun gives to what faces it; metres that haze takes
 HAZE = np.array([0.66, 0.76, 0.87])
@@ -477,10 +479,12 @@ def drawn(name: str) -> np.ndarray:
 
 
 def developed(light: np.ndarray) -> np.ndarray:
-    """Linear RGB in [0, 1] of radiance: bright, what is brighter rolled off, shadows opened a little."""
-    light = 1.12 * light
-    level = light @ (0.2126, 0.7152, 0.0722)
-    opened = light * (np.maximum(level, 1e-4) ** -0.10)[..., None]
+    """Linear RGB in [0, 1] of radiance (h, w, 3): bright, what lies about the horizon, too, a little paler, what is
+    brighter rolled off, shadows opened a little."""
+    level = (light @ (0.2126, 0.7152, 0.0722))[..., None]
+    bright = max(1.12, ABOUT / np.median(level[2 * len(level) // 5 : 3 * len(level) // 5]))
+    light, level = bright * light, bright * level
+    opened = (light + PALER * (level - light)) * np.maximum(level, 1e-4) ** -0.10
     return np.where(opened < 0.55, opened, 0.55 + 0.45 * (1 - np.exp(-(opened - 0.55) / 0.45)))
 
 

@@ -108,12 +108,12 @@ def tree(seed: int, tall: float = 8.0, *, bare: float = 0.25, leaf: float = 0.15
 
     grow(np.zeros(3), np.array([0.0, 1, 0]), 0.82 * tall, 0.022 * tall, 0)
     ends = np.concatenate(tips)
-    at = ends.repeat(max(1, many // 4), 0)
+    at = ends.repeat(max(1, many // 2), 0)
     at = at + rng.normal(0, 0.035 * tall, at.shape) * (1, 0.8, 1)
     own = GREENS[seed % 3] if green is None else green
     trunk, *branches = wood
     stem = part(trunk, (0.52, 0.50, 0.47) if birch else BARK)
-    return joined([stem, part(np.concatenate(branches), BARK), leaves(rng, at, leaf, own, 0.9 if birch else 0.3)])
+    return joined([stem, part(np.concatenate(branches), BARK), leaves(rng, at, 0.7 * leaf, own, 0.9 if birch else 0.3)])
 
 
 def conifer(seed: int, tall: float = 11.0) -> Parts:

@@ -18,9 +18,9 @@ from echousd.stage.values import NOW
 # Of what is told of the sun, by colour, as Blender has it: eyes see it brighter than a camera in the room would bear,
 # and pictures of rooms have it warmer than the light of the sky.
 SUN = 4 * np.array([1.12, 1.0, 0.78], np.float32)
-# What is seen through windows is exposed for itself, as photographers of interiors blend it in: how bright by day, the
-# power of the sky's light by which it is less in the evening, and haze before it.
-THERE, DUSK, VEIL = 2.5, 0.5, 0.03
+# What is seen through windows is over-exposed, as in photographs of interiors, and rolled off as film does: how much
+# brighter it is by day, the power of the sky's light by which it is less in the evening, and haze before it.
+THERE, DUSK, VEIL = 2.45, 0.5, 0.04
 WHITER = 0.25  # how much less coloured the light of lamps is than told: no wall is as yellow to eyes
 DIM = 0.004  # radiance at every place of a room without lamps and windows, so that one sees it
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
@@ -101,13 +101,14 @@ class Lights:
 
     def there(self, color: np.ndarray) -> np.ndarray:
         """(3, n) how a picture shows colours (3, n) of what lies around."""
-        return np.asarray((VEIL + (1 - VEIL) * color) * (THERE * self.day**DUSK * self.tint)[:, None], "f4")
+        return np.asarray(rolled((VEIL + (1 - VEIL) * color) * (THERE * self.day**DUSK * self.tint)[:, None]), "f4")
 
 
-def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
+def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = (), halved: int = 0) -> Lights:
     """The lights of a stage: domes, the brightest distant light, spheres; flat ones where it is dark and no lamp is.
 
-    `shades`: of everything that glows its triangles (f, 3, 3) in the world, metres.
+    `shades`: of everything that glows its triangles (f, 3, 3) in the world, metres. `halved`: how often the sides of
+    the picture of what lies around are.
     """
     frame, cache = to_metres(stage), UsdGeom.XformCache(NOW)
     sky, suns, bulbs, power, tint = 0.0, [], [], [], np.ones(3, np.float32)
@@ -122,7 +123,7 @@ def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
             domes, sky, tint = domes + 1, sky + strength, color / max(strength, 1e-9)
             picture = UsdLux.DomeLight(prim).GetTextureFileAttr().Get(NOW)
             if picture is not None:
-                view = image_of(str(prim.GetPath()), picture.resolvedPath)
+                view = image_of(str(prim.GetPath()), picture.resolvedPath, halved)
         elif prim.IsA(UsdLux.DistantLight):
             towards = world[:3, 2] / max(float(np.linalg.norm(world[:3, 2])), 1e-9)
             suns.append(np.stack([towards, color]))

@@ -85,7 +85,7 @@ def scenery_of(stage: Usd.Stage, size: int, colors: str) -> Scenery:
     if not 16 <= size <= LARGEST:
         raise ValueError(f"size is {size} pixels, allowed: 16 to {LARGEST}")
     with reading(stage):
-        return read_scenery(stage, by_class=colors == "class")
+        return read_scenery(stage, by_class=colors == "class", halved=int(size < QUALITIES["fine"][0]))
 
 
 def as_image(pixels: np.ndarray) -> Image.Image:

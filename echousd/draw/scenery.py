@@ -156,10 +156,8 @@ class Scenery:
         self, face: np.ndarray, bary: np.ndarray, breadth: np.ndarray, atlas: tuple[np.ndarray, ...]
     ) -> np.ndarray:
         """(3, n) colour of places, as in `told`."""
-        out, (drawn, color, number) = (
-            self.planes.color.take(face, 1),
-            self.told(COLOR, face, bary, breadth, atlas, LINEAR),
-        )
+        out = self.planes.color.take(face, 1)
+        drawn, color, number = self.told(COLOR, face, bary, breadth, atlas, LINEAR)
         out[:, drawn] = color * atlas[2].take(number, 1)
         return out
 
@@ -244,11 +242,12 @@ def class_color(category: str) -> tuple[float, float, float]:
     return red**2.2, green**2.2, blue**2.2
 
 
-def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
+def read_scenery(stage: Usd.Stage, *, by_class: bool = False, halved: int = 0) -> Scenery:
     """Collect every visible mesh of a stage.
 
     `stage`: any stage; Z-up and other units are converted. `by_class`: colour by the nearest
-    `SemanticsLabelsAPI:category` instead of by material. Raises ValueError when there is no mesh to see.
+    `SemanticsLabelsAPI:category` instead of by material. `halved`: as in `read_lights`. Raises ValueError when there is
+    no mesh to see.
     """
     parts: list[dict[str, np.ndarray]] = []
     images: dict[tuple, tuple[Callable[[int], np.ndarray], np.ndarray]] = {}
@@ -317,7 +316,7 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
         images=tuple(images.values()), things=tuple(things),
         panes=np.array([pane for _, pane in panes], np.float32).reshape(-1, 3, 3),
         pane_wall=np.array([walls.get(wall, -1) for wall, _ in panes], int),
-        lights=read_lights(stage, [np.concatenate(each) for each in shades.values()]),
+        lights=read_lights(stage, [np.concatenate(each) for each in shades.values()], halved),
         roofed=roofed, above=tuple(above), **joined,
     )  # fmt: skip
 
