@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from typing import Any
+from zlib import crc32
 
 from echomodel.dressing import PRINTS
 from echousd.shapes.finishes import baking
@@ -18,13 +19,14 @@ def look_images(look: Look, harmony: str) -> dict[str, tuple[str, bytes]]:
     """Input of a UsdPreviewSurface -> (path in the room's folder, image) of a look with a pattern; {} without one."""
     if not look.pattern:
         return {}
-    tint = harmony if look.pattern in PRINTS else baking.hexadecimal(look.color)
-    worn = 0.0 if look.pattern in PRINTS else look.worn
+    printed = look.pattern in PRINTS  # of which many are alike in several harmonies, and lie on the same cloth
+    worn, cloth = (0.0, look.pattern.partition("_")[0]) if printed else (look.worn, look.pattern)
     image = baking.color_image(look.pattern, look.color, harmony, worn)
+    tint = f"{crc32(image):08x}" if printed else baking.hexadecimal(look.color)
     found = {"diffuseColor": (f"{look.pattern}_{tint}" + f"_worn{1000 * worn:.0f}" * (worn > 0), image)}
     normal, rough = baking.normal_image(look.pattern, look.metres), baking.rough_image(look.pattern, look.roughness)
     if normal is not None:
-        found["normal"] = (f"{look.pattern}_{look.metres * 100:.0f}cm_normal", normal)
+        found["normal"] = (f"{cloth}_{look.metres * 100:.0f}cm_normal", normal)
     if rough is not None:
         found["roughness"] = (f"{look.pattern}_{look.roughness * 100:.0f}_roughness", rough)
     return {name: (f"textures/{path}.jpg", content) for name, (path, content) in found.items()}

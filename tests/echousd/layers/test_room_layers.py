@@ -94,6 +94,16 @@ def test_pictures_of_materials_are_called_after_what_they_show():
     }  # fmt: skip
 
 
+def test_equal_images_of_prints_are_one_file():
+    """Many sheets look the same in several harmonies, and cushions are of one cloth whatever is printed on them."""
+    prints = [look("oak", slot) for slot in ("picture_sea", "cushion_fern", "cushion_blocks")]
+    sea, fern, blocks = (look_images(one, "oak") for one in prints)
+    assert look_images(prints[0], "olive") == sea
+    assert look_images(prints[1], "olive")["diffuseColor"][0] != fern["diffuseColor"][0]
+    assert fern["normal"] == blocks["normal"]
+    assert fern["diffuseColor"] != blocks["diffuseColor"]
+
+
 def test_a_model_that_is_carried_along_keeps_its_bytes_but_for_where_another_lies(tmp_path):
     own = Original(np.eye(4), "/chair", files={"chair.usd": b""})
     files = {asset_file("chair"): b"#usda 1.0\n"}
@@ -313,6 +323,88 @@ def test_an_asset_is_complete_by_itself(root):
     colliders = [p for p in alone.Traverse() if p.HasAPI(UsdPhysics.CollisionAPI)]
     assert colliders
     assert all(p.GetName().startswith("bed_collider") for p in colliders)
+    assert bed.GetInherits().GetAllDirectInherits() == ["/_class_/bed"]
+    assert stage.GetPrimAtPath("/_class_/bed").GetSpecifier() == Sdf.SpecifierClass
+    assert bed.GetVariantSet("LOD").GetVariantNames() == ["high", "proxy"]
+    palettes = bed.GetVariantSet("palette")
+    color = stage.GetAttributeAtPath("/bed/mtl/wood/surface.inputs:diffuseColor")
+    seen = set()
+    for name in palettes.GetVariantNames():
+        palettes.SetVariantSelection(name)
+        seen.add(tuple(color.Get()))
+    assert len(seen) == len(palettes.GetVariantNames()) == 6
+    # the proxy: colliders are seen in place of the meshes, with a material
+    bed.GetVariantSet("LOD").SetVariantSelection("proxy")
+    shown = [
+        prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)
+        and UsdGeom.Imageable(prim).ComputeVisibility() != "invisible"
+        and UsdGeom.Imageable(prim).ComputePurpose() == "default"
+    ]  # fmt: skip
+    assert shown
+    assert all(prim.GetName().startswith("bed_collider") for prim in shown)
+    assert UsdShade.MaterialBindingAPI(shown[0]).ComputeBoundMaterial()[0]
+
+
+def test_nightstands_share_looks_and_styles_differ_from_the_room(stage):
+    def bound(path):
+        return UsdShade.MaterialBindingAPI(stage.GetPrimAtPath(path)).ComputeBoundMaterial()[0].GetPrim().GetName()
+
+    left = bound("/Room/Objects/nightstand_left/geo/nightstand_mesh/wood")
+    assert left == bound("/Room/Objects/nightstand_right/geo/nightstand_mesh/wood") == "set_nightstand_left_wood"
+    assert bound("/Room/Objects/wardrobe/geo/wardrobe_mesh/wood") == "room_wood"
+
+
+def test_semantics(stage):
+    labels = {}
+    for prim in stage.Traverse():
+        if prim.HasAPI(UsdSemantics.LabelsAPI, "category"):
+            labels[prim.GetName()] = {
+                n: UsdSemantics.LabelsAPI(prim, n).GetLabelsAttr().Get()[0] for n in ("category", "ade20k")
+            }
+    assert labels["nightstand_left"] == {"category": "nightstand", "ade20k": "chest of drawers"}
+    assert labels["Floor"] == {"category": "floor", "ade20k": "floor"}
+    assert set(labels) == set(OBJECTS) | {"Floor"}
+
+
+def test_physics(stage):
+    bodies = [prim for prim in stage.Traverse() if prim.HasAPI(UsdPhysics.RigidBodyAPI)]
+    assert {prim.GetName() for prim in bodies} == set(OBJECTS) - {"pendant"}  # what hangs does not fall
+    for prim in bodies:
+        assert 0.2 <= UsdPhysics.MassAPI(prim).GetMassAttr().Get() <= 300
+        above = prim.GetParent()
+        while above:
+            assert not above.HasAPI(UsdPhysics.RigidBodyAPI)
+            above = above.GetParent()
+    colliders = [prim for prim in stage.Traverse() if prim.HasAPI(UsdPhysics.CollisionAPI)]
+    approximation = {p.GetName(): UsdPhysics.MeshCollisionAPI(p).GetApproximationAttr().Get() for p in colliders}
+    assert approximation.pop("Floor_mesh") == "none"
+    assert set(approximation.values()) <= {"convexHull", *(() if find_spec("coacd") else ("convexDecomposition",))}
+    assert len(colliders) >= len(OBJECTS) + 1  # what is hollow has several
+    assert len([p for p in stage.Traverse() if p.IsA(UsdPhysics.Scene)]) == 1
+
+
+def test_every_body_has_a_mass_that_engines_take(stage):
+    for prim in stage.Traverse():
+        if prim.HasAPI(UsdPhysics.RigidBodyAPI):
+            mass = UsdPhysics.MassAPI(prim)
+            moments = sorted(mass.GetDiagonalInertiaAttr().Get())
+            assert 0 < moments[0] <= moments[2] <= (moments[0] + moments[1]) * 1.001, prim
+            contact = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("physics")[0]
+            friction = UsdPhysics.MaterialAPI(contact)
+            assert friction.GetStaticFrictionAttr().Get() >= friction.GetDynamicFrictionAttr().Get() > 0, prim
+            assert friction.GetDensityAttr().Get() > 0
+
+
+def test_an_asset_is_complete_by_itself(root):
+    alone = Usd.Stage.Open(str(root.parent / "assets/bed/bed.usda"))
+    bed = alone.GetDefaultPrim()
+    assert bed.HasAPI(UsdPhysics.RigidBodyAPI)
+    assert bed.GetAttribute("semantics:labels:category").Get() == ["double_bed"]
+    colliders = [p for p in alone.Traverse() if p.HasAPI(UsdPhysics.CollisionAPI)]
+    assert colliders
+    assert all(p.GetName().startswith("bed_collider") for p in colliders)
+    meshes = Sdf.Layer.FindOrOpen(str(root.parent / "assets/bed/bed_geo.usdc"))  # what they are is told where they are
+    assert all("PhysicsCollisionAPI" in str(meshes.GetPrimAtPath(p.GetPath()).GetInfo("apiSchemas")) for p in colliders)
     assert bed.GetInherits().GetAllDirectInherits() == [Sdf.Path("/_class_/bed")]
 
 
