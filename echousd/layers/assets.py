@@ -10,7 +10,7 @@ from pxr import Sdf
 from echomodel.late import lates
 from echomodel.triangles import area_normals, lengths
 from echousd.layers.materials import write_looks, write_palettes
-from echousd.layers.physics import write_asset_physics, write_joints
+from echousd.layers.physics import collides, write_asset_physics, write_joints
 from echousd.options import Look
 from echousd.shapes.geometry import Geometry
 from echousd.shapes.looks import alternatives, look, palette_for
@@ -80,12 +80,14 @@ def write_mesh(pen: Pen, path: str, form: Surface, **about: str) -> None:
 
 
 def geometry_layer(
-    name: str, forms: Mapping[str, Surface], geometry: Geometry, data: Mapping[str, Any], style: str = ""
-) -> Sdf.Layer:
+    name: str, forms: Mapping[str, Surface], geometry: Geometry, data: Mapping[str, Any], style: str = "",
+    *, solid: bool = True,
+) -> Sdf.Layer:  # fmt: skip
     """`<name>_geo`: a mesh for every part and, as guides, the colliders; their looks; what the furniture was made from.
 
     `forms`: path of a part below the root -> its surface. `geometry`: whose parts these are, and whose colliders are
-    written. `data`: customLayerData. `style`: chooses the looks, which a room's materials layer overrides.
+    written, which stop things where they are `solid`. `data`: customLayerData. `style`: chooses the looks, which a
+    room's materials layer overrides.
     """
     pen = Pen.blank(name, ".usdc", data)
     fields = {f"custom float[] {DESCRIPTION}": geometry.description} if geometry.description else {}
@@ -97,7 +99,10 @@ def geometry_layer(
         write_mesh(pen, f"/{name}{path}", form)
     guides = () if geometry.theirs_collides else geometry.colliders
     for collider, form in zip(guides, plain([guide.mesh for guide in guides]), strict=True) if guides else ():
-        write_mesh(pen, piece_path(f"/{name}", name, collider.name, collider.body), form, purpose="guide")
+        path = piece_path(f"/{name}", name, collider.name, collider.body)
+        write_mesh(pen, path, form, purpose="guide")
+        if solid:
+            collides(pen, path, collider.approximation)
     _write_looks(pen, name, style, {part: tuple(form.groups) for part, form in forms.items()})
     return pen.layer
 

@@ -63,19 +63,15 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
     `shelf`: takes assets and images, which are not among the files then. `folder`: where the room will lie, which paths
     of models outside of it are relative to; None = the present one.
     """
-    files: dict[str, bytes] = {}
-    made: dict[str, Asset] = {}
-    for name, user in room.asset_users.items():
-        made[name] = _asset(room, name, user, shelf, (folder or Path.cwd()) / "assets" / name)
-        files.update(made[name].files)
-    origins = {name: room.geometry[user].origin for name, user in room.asset_users.items()}
-    if theirs := {name: origin for name, origin in origins.items() if origin.asset}:  # models of other people
-        files[FILE] = attribution(room.name, theirs).encode()
+    place = (folder or Path.cwd()) / "assets"
+    made = {name: _asset(room, name, user, shelf, place / name) for name, user in room.asset_users.items()}
     dressing = dress(room)
     asked = Look(**room.options.model_dump(include=ASSETS))
     small = {name: _small(asked, name, recipe) for name, recipe in dressing.recipes.items()}
-    for asset in small.values():
-        files.update(asset.files)
+    files = {path: content for asset in (*made.values(), *small.values()) for path, content in asset.files.items()}
+    origins = {name: room.geometry[user].origin for name, user in room.asset_users.items()}
+    if theirs := {name: origin for name, origin in origins.items() if origin.asset}:  # models of other people
+        files[FILE] = attribution(room.name, theirs).encode()
     if room.options.thumbnails:
         files |= thumbnails(files, [*made, *small])
     built = structure.shell_prims(room, dressing.bare, dressing.cuts)
@@ -164,11 +160,9 @@ def layout_layer(room: RoomData) -> Sdf.Layer:
         for number, name in enumerate(room.names):
             x, y, z = (round(float(v), 5) + 0.0 for v in boxes.position[number])
             turn = ("float", round(float(np.degrees(float(boxes.yaw[number]))), 4) + 0.0)
-            if room.options.up_axis == "Z":
-                values = ops(translate=("double3", (x, 0.0 - z, y)), rotateZ=turn)
-            else:
-                values = ops(translate=("double3", (x, y, z)), rotateY=turn)
-            inside.over(f"{OBJECTS}/{name}", values)
+            place = (x, 0.0 - z, y) if room.options.up_axis == "Z" else (x, y, z)
+            turned = {f"rotate{room.options.up_axis}": turn}
+            inside.over(f"{OBJECTS}/{name}", ops(translate=("double3", place), **turned))
     return pen.layer
 
 
@@ -263,7 +257,7 @@ def root_layer(room: RoomData, hung: Furniture | None = None, walls: Sequence[np
 
 
 def _asset(room: RoomData, name: str, user: str, shelf: Shelf | None, folder: Path) -> Asset:
-    geometry = room.geometry[user]
+    geometry, word = room.geometry[user], word_of(room.graph.node(user))
     if geometry.original is not None:
         if shelf is not None:  # a model lies once in the store, however many rooms place it in whatever size
             kept = shelf.kept_apart(name, geometry.original.files, geometry.original.main)
@@ -273,12 +267,11 @@ def _asset(room: RoomData, name: str, user: str, shelf: Shelf | None, folder: Pa
         if name in room.carried:
             return Asset(name, {}, carried_files(name, geometry.original, room.carried[name], folder))
         data = _asset_data(name, geometry)
-        word = word_of(room.graph.node(user))
         return Asset(name, {}, placed_files(name, word, geometry, data, folder, room.options))
     if name in room.carried:
         carried = {piece_path("", name, part.name, part.body): tuple(part.slots) for part in geometry.parts}
         return Asset(name, carried, room.carried[name])
-    return _written(room.options, name, word_of(room.graph.node(user)), room.styles[user], geometry)
+    return _written(room.options, name, word, room.styles[user], geometry)
 
 
 @lru_cache(maxsize=1024)  # of some 25 kB each
@@ -289,18 +282,17 @@ def _small(look: Look, name: str, recipe: Recipe) -> Asset:
 
 def _written(look: Look, name: str, category: str, style: str, geometry: Geometry) -> Asset:
     forms = _forms(name, geometry.parts, atlas=look.atlas)
-    slots = {part: tuple(form.groups) for part, form in forms.items()}
     extents = np.stack([form.extent for form in forms.values()])
     extent = np.stack([extents[:, 0].min(0), extents[:, 1].max(0)])
     data = _asset_data(name, geometry)
-    payload = assets.geometry_layer(name, forms, geometry, data, style)
+    payload = assets.geometry_layer(name, forms, geometry, data, style, solid=physics.stops(category))
     layer = assets.component_layer(name, category, extent, geometry, data)
     coarse = _forms(name, geometry.coarse) if geometry.coarse else {}
     low = {asset_file(name, "low"): _bytes(look, assets.coarse_layer(name, coarse, data), ".usdc")} if coarse else {}
-    files = {
+    slots = {part: tuple(form.groups) for part, form in forms.items()}
+    return Asset(name, slots, {
         **low, asset_file(name, "geo"): _bytes(look, payload, ".usdc"), asset_file(name): _bytes(look, layer, ".usda"),
-    }  # fmt: skip
-    return Asset(name, slots, files)
+    })  # fmt: skip
 
 
 def _forms(name: str, parts: Sequence[Part], *, atlas: bool = False) -> dict[str, Surface]:

@@ -36,17 +36,18 @@ def movable(category: str) -> bool:
     return vocabulary().category(category).support in ("floor", "table")
 
 
-def write_asset_physics(pen: Pen, asset: str, category: str, geometry: Geometry, slots: Iterable[str]) -> None:
-    """Author colliders, mass and contact material of one asset as overs on its prims.
+def stops(category: str) -> bool:
+    """Whether a thing of this category stops others: small cloths do not."""
+    return category not in SMALL or not (SMALL[category].lies or SMALL[category].yields)
 
-    `pen`: of the component layer, whose default prim is `/<asset>`. `category`: of the piece; what hangs gets colliders
-    alone. `geometry`: whose colliders and mass are told. `slots`: its material slots, the one that most of it is made
-    of first.
+
+def write_asset_physics(pen: Pen, asset: str, category: str, geometry: Geometry, slots: Iterable[str]) -> None:
+    """Author mass and contact material of one asset as overs on its prims.
+
+    `pen`: of the component layer, whose default prim is `/<asset>`. `category`: of the piece; what hangs is no body.
+    `geometry`: whose mass is told. `slots`: its material slots, the one that most of it is made of first.
     """
     root = f"/{asset}"
-    cloth = category in SMALL and (SMALL[category].lies or SMALL[category].yields)  # stops nothing
-    for collider in () if cloth or geometry.theirs_collides else geometry.colliders:
-        collides(pen, piece_path(root, asset, collider.name, collider.body), collider.approximation)
     mass = mass_of(geometry, category)
     volume = sum(max(hull_volume(collider.mesh.vertices), 1e-6) for collider in geometry.colliders)
     slot = next(iter(slots), "wood")
