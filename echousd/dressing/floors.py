@@ -1,5 +1,6 @@
 """What lies and stands on the floor: rugs, clusters by furniture; what stands in corners where nobody walks."""
 
+from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
@@ -145,16 +146,14 @@ def clusters(setting: Setting) -> None:
             break
 
 
-def _by(host: Standing, wish: Wish, rng: np.random.Generator) -> list[Thing]:
+def _by(host: Standing, wish: Wish, rng: np.random.Generator) -> Iterator[Thing]:
     """A wished thing at each of its places beside furniture."""
     size, variant = usual(kind := str(rng.choice(wish.of)), rng)
     lean = float(rng.uniform(-3, 3) if wish.turn == "any" else rng.uniform(-0.2, 0.2))
-    out = []
     for x, z, dx, dz in wish.at:
         place = host.on_floor(x * host.size[0] / 2 + dx, z * host.size[2] / 2 + dz)
         away = float(np.sign(dx)) * np.pi / 2 if wish.turn == "out" else 0.0
-        out.append(Thing(kind, size, place, host.yaw + lean + away, "", variant))
-    return out
+        yield Thing(kind, size, place, host.yaw + lean + away, "", variant)
 
 
 GREEN = 2  # plants that a room has at most, those of the graph counted

@@ -39,15 +39,12 @@ class Seat:
         corners = host.geometry.mesh.triangles
         normal = area_normals(corners)
         double = np.linalg.norm(normal, axis=1)
-        y = corners[..., 1].mean(1)
-        top = 0.75 * float(host.size[1])
-        up = (normal[:, 1] > 0.85 * double) & (y > 0.2) & (y < min(0.62, top)) & (double > 0)
         half = host.size[[0, 2]] / 2
         x = np.arange(-half[0], half[0], STEP) + STEP / 2
         z = np.arange(-half[1], half[1], STEP) + STEP / 2
         height = heights_of(corners[normal[:, 1] > 0.05 * double], x, z)
-        lies = height[(height > 0.2) & (height < min(0.62, top))]
-        if min(double[up].sum() / 2, lies.size * STEP**2) < 0.12:
+        lies = height[(height > 0.2) & (height < min(0.62, 0.75 * float(host.size[1])))]
+        if lies.size * STEP**2 < 0.12:
             return None
         return cls(x, z, height, float(np.quantile(lies, LOW)))
 

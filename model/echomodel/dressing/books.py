@@ -5,7 +5,7 @@ from itertools import islice
 
 import numpy as np
 
-from echomodel.furniture.carpentry import Size, box
+from echomodel.furniture.carpentry import Size, both, box
 from echomodel.furniture.solids import Solid, rotation
 
 COVERS = ("book_a", "book_b", "book_c", "book_d")
@@ -13,13 +13,12 @@ COVERS = ("book_a", "book_b", "book_c", "book_d")
 
 def book_row(size: Size, rng: np.random.Generator) -> list[Solid]:
     """Books upright side by side with their spines to the front."""
-    w, h, d = size
-    parts: list[Solid] = []
-    at, thick = -w / 2, float(rng.uniform(0.016, 0.042))
-    while at + thick <= w / 2:
+    (w, h, d), parts, at = size, list[Solid](), -float(size[0]) / 2
+    while at + (thick := float(rng.uniform(0.016, 0.042))) <= w / 2:
         tall, deep = h * rng.uniform(0.78, 1.0), d * rng.uniform(0.8, 1.0)
-        parts += _upright(at, thick, tall, deep, d, str(rng.choice(COVERS)))
-        at, thick = at + thick + 0.0008, float(rng.uniform(0.016, 0.042))
+        place = np.array([at + thick / 2, 0, (d - deep) / 2])
+        parts += [replace(one, centre=one.centre + place) for one in book(np.array([thick, tall, deep]), rng)]
+        at += thick + 0.0008
     return parts
 
 
@@ -40,25 +39,12 @@ def book_size(number: int) -> np.ndarray:
 
 def book(size: Size, rng: np.random.Generator) -> list[Solid]:
     """One book upright, its spine to the front: in paper, or between boards, its back flat or round."""
-    w, h, d = size
+    (x, h, z), cover = size / (2, 1, 2), str(rng.choice(COVERS))
     board, over = rng.uniform((0.0016, 0.002), (0.005, 0.008)) if rng.random() < 0.7 else (0.001, 0.0)
-    back = float(rng.uniform(0.003, 0.006)) if over and rng.random() < 0.5 else 0.0012
-    return _upright(-w / 2, w, h, d, d, str(rng.choice(COVERS)), board, over, back)
-
-
-def _upright(
-    at: float, thick: float, tall: float, deep: float, d: float, cover: str, board: float = 0.003, over: float = 0.003,
-    back: float = 0.0012,
-) -> list[Solid]:  # fmt: skip
-    """A book between boards that reach `over` metres beyond its pages, its back rounded by `back` metres."""
-    front, spine = d / 2, max(board, 2 * back)
-    pages = box((at + board, over, front - deep + over), (at + thick - board, tall - over, front - board), "paper")
-    return [
-        box((at, 0, front - deep), (at + board, tall, front - back), cover),
-        box((at + thick - board, 0, front - deep), (at + thick, tall, front - back), cover),
-        box((at, 0, front - spine), (at + thick, tall, front), "spines", back),
-        pages,
-    ]
+    back = float(rng.uniform(0.003, 0.006)) if over and rng.random() < 0.5 else 0.0012  # how round it is
+    sides = both(box((x - board, 0, -z), (x, h, z - back), cover))
+    spine = box((-x, 0, z - max(board, 2 * back)), (x, h, z), "spines", back)
+    return [*sides, spine, box((board - x, over, over - z), (x - board, h - over, z - board), "paper")]
 
 
 LAID = np.array([(0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0)])  # turns what is upright on its side

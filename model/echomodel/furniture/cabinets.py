@@ -13,7 +13,6 @@ from echomodel.furniture.solids import Lathe, Solid, rotation
 from echomodel.furniture.style import Choices, Style
 
 GABLED = 1.2  # metres: on what is lower people put things, for which its top is flat
-BOOKS = ("book_a", "book_b", "book_c", "book_d", "book")  # slots that books take their colours from
 ROWS, COLUMNS = 9, 14  # at most, however large the box is
 CELLS = 18  # that are filled with books at most
 
@@ -195,8 +194,8 @@ def _books(x0: float, x1: float, y0: float, y1: float, z0: float, z1: float, rng
     reach = tall * np.sin(lean) + thick * np.cos(lean)
     if upper and x + reach < x1:  # one leans on the last of the row
         middle = np.array([x + reach / 2, y0 + (tall * np.cos(lean) + thick * np.sin(lean)) / 2, z0 + 0.42 * deep])
-        leaning = box((-thick / 2, -tall / 2, -0.4 * deep), (thick / 2, tall / 2, 0.4 * deep), str(rng.choice(BOOKS)))
-        parts.append(replace(leaning, centre=middle, turn=rotation(z=lean), role="book"))
+        half, cover = np.array([thick, tall, 0.8 * deep]) / 2, str(rng.choice(["book_a", "book_c"]))
+        parts.append(replace(box(-half, half, cover, 0.0, "book"), centre=middle, turn=rotation(z=lean)))
         x += reach
     left, height = x + 0.02, y0
     for _ in range(int(rng.integers(0, 4)) if x1 - left > 0.16 else 0):  # a lying pile

@@ -83,9 +83,8 @@ def top(shape: str, width: float, depth: float, y: float, thick: float, style: S
     half = (width / 2, depth / 2)
     power = {"square": np.inf, "corners": corner_power(style), "round": 2.0}[shape]
     rounding = 0.0 if shape == "square" else thick * 0.3 * style.softness
-    under = min(0.5 * thick, 0.012 * min(width, depth)) * (
-        style.edge > 0.4 and material != "fabric"
-    )  # bevelled below, it looks less thick
+    bevelled = style.edge > 0.4 and material != "fabric"  # below, so that it looks less thick
+    under = bevelled * min(0.5 * thick, 0.012 * min(width, depth))
     form = {"power": power, "rounding": rounding, "material": material, "role": "top"}
     return turned((0.0, y - thick, 0.0), (half[0] - under, half[1] - under), thick, half, **form)
 

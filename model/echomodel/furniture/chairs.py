@@ -225,7 +225,6 @@ def bar_stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
     backed = h > 0.88 or choices.chance("back", 0.3)
     seat = min(0.75, h * 0.78) if backed else h
     thick = 0.035 + 0.04 * style.softness
-    parts: list[Solid] = []
     if choices.chance("form", 0.25):
         r = 0.026
         foot, rest = turned((0, 0, 0), w * 0.46, 0.03, w * 0.42), turned((0, seat * 0.35, 0), w * 0.28, 0.022)
@@ -233,7 +232,7 @@ def bar_stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
     else:
         legs = style.legs if style.legs in ("tapered", "splayed", "straight", "sled") else "splayed"
         share = 0.98 if legs == "splayed" else 0.7 if style.round_tops > 0.5 else 0.86
-        parts += base(style, w * share, d * share * 0.96, seat - thick * 0.6, 0.032 * style.bulk, legs, tie=True)
+        parts = base(style, w * share, d * share * 0.96, seat - thick * 0.6, 0.032 * style.bulk, legs, tie=True)
     shape = "round" if style.round_tops > 0.5 else "corners"
     board = top(shape, w * 0.92, d * 0.88, seat, thick, style, "fabric")
     parts.append(replace(board, rounding=thick * 0.4, role="seat"))
