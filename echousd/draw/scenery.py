@@ -46,7 +46,7 @@ class Scenery:
     normals: np.ndarray
     flat_colors: np.ndarray  # flat_colors, emissive: (f, 3) float32 linear RGB
     emissive: np.ndarray
-    gloss: np.ndarray  # gloss, thin: (f,) float32 in [0, 1]; the latter what comes through it of light from behind
+    gloss: np.ndarray  # gloss, thin: (f,) float32 in [0, 1]; what comes through it of light from behind, 1: glass
     thin: np.ndarray
     st: np.ndarray  # (f, 3, 2) float32 texture coordinates
     texture: np.ndarray  # (f, 2) int, which of `images` are a face's `COLOR` and `RELIEF` (normals), -1 for none
@@ -297,6 +297,8 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False, halved: int = 0) -
         if mesh.category == "beam":
             above.append(part)
             continue
+        if np.ptp(points, axis=0).max(initial=0) < SMALL:
+            part["thin"][clear] = 1
         if clear.any() and not clear.all():
             across = np.abs(area_normals(part["triangles"]))
             keep = ~clear | (across[:, [0, 2]].max(1) < np.maximum(GLAZED, 3 * across[:, 1]))

@@ -111,6 +111,7 @@ BEFORE, THICK = np.float32(2e-3), np.float32(0.016)
 # cosine by which that is less aside; how bright bars of the window are before the light.
 BEHIND, SEEN_BY, CLOSER, BAR = 0.05, 0.42, 6, 0.45
 MIRROR = 0.8  # gloss of what mirrors like glass with silver behind it
+SHEETS, RIMS = 12, 0.4  # of glass that one looks through; cosine below which it is seen itself: at rims
 
 
 def _met(world: World, pixel: np.ndarray, place: np.ndarray, first: Seen | None = None) -> tuple[np.ndarray, Seen]:
@@ -129,13 +130,17 @@ def _met(world: World, pixel: np.ndarray, place: np.ndarray, first: Seen | None 
             new = np.flatnonzero(hit[0] != first.face.take(rows))
             origin, way, rows, *hit = (each.take(new, -1) for each in (origin, way, rows, *hit))
         part = _seen(world, origin, way, hit)
-        mirror = np.flatnonzero((part.face >= 0) & (world.scenery.gloss.take(part.face) > MIRROR))
-        if len(mirror):  # who looks into a mirror sees what is before it
-            way, normal = way.take(mirror, 1), part.normal.take(mirror, 1)
-            way = way - 2 * along(way, normal) * normal
-            origin = part.point.take(mirror, 1) + BEFORE * normal
-            for own, other in zip(part, _seen(world, origin, way, first_hit(world, origin, way)), strict=True):
-                own[..., mirror] = other
+        for glass in (True,) * SHEETS + (False,):  # through it one sees what is behind, in a mirror what is before
+            looks = world.scenery.thin.take(part.face) == 1 if glass else world.scenery.gloss.take(part.face) > MIRROR
+            some = np.flatnonzero(looks & (part.face >= 0))
+            some = some[-along(way.take(some, 1), part.normal.take(some, 1)) > (RIMS if glass else 0)]
+            if not len(some):
+                continue
+            on, normal = way.take(some, 1), part.normal.take(some, 1)
+            on = on if glass else on - 2 * along(on, normal) * normal
+            origin = part.point.take(some, 1) + BEFORE * (on if glass else normal)
+            for own, other in zip(part, _seen(world, origin, on, first_hit(world, origin, on)), strict=True):
+                own[..., some] = other
         if first is not None:
             differs = np.flatnonzero(_other(world, part, first.of(rows)))
             part, rows = part.of(differs), rows.take(differs)

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, product
+from itertools import product
 
 import numpy as np
 
@@ -84,8 +84,7 @@ def curtains(setting: Setting) -> None:
             full = round(min(0.6, 0.2 + 0.2 * window.width), 3)
             low, high = np.clip((window.offset - beyond, window.end + beyond), 0.02, wall.length - 0.02).tolist()
             feet = (0.015, window.sill - APRON) if window.sill > 0.5 else (0.015,)
-            down = product(feet[:1], INWARD, BUNCHED)
-            for foot, inward, share in chain(down, product(feet[1:], INWARD[:2], BUNCHED)):
+            for foot, inward, share in (*product(feet[:1], INWARD, BUNCHED), *product(feet[1:], INWARD[:2], BUNCHED)):
                 size = np.array([round(full * share, 3), round(rail - foot + 0.005, 3), 0.085])
                 inner = size[0] / 2 + inward * (high - low)
                 places = (wall.at(x, before, foot) for x in (low + inner, high - inner))

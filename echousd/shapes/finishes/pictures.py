@@ -212,13 +212,13 @@ def printed(name: str, harmony: str) -> np.ndarray:
 def color_image(pattern: str, color: Color, harmony: str, worn: float = 0.0) -> bytes:
     """A pattern in a colour (linear RGB), `aged` by a share, or what is printed in those of a harmony, as JPEG."""
     if pattern in PRINTS:
-        return _jpeg(printed(pattern, harmony))
+        return _encoded(from_linear(printed(pattern, harmony)), QUALITY)
     tone = relief(pattern).tone
     if pattern in GRAINED and not (color[1] < LIKE_WOOD[0] * color[0] and color[2] < LIKE_WOOD[1] * color[0]):
         tone, worn = 1 + UNDER_PAINT * (tone - 1), UNDER_PAINT * worn
     tone = aged(tone, worn) if worn else tone
     tone = tone[..., None] if tone.ndim == 2 else tone
-    return _jpeg(np.clip(tone * np.asarray(color), 0, 1))
+    return _encoded(from_linear(np.clip(tone * np.asarray(color), 0, 1)), QUALITY)
 
 
 def normal_image(pattern: str, metres: float) -> bytes | None:
@@ -239,10 +239,6 @@ def rough_image(pattern: str, roughness: float) -> bytes | None:
     """Roughness about a mean, grey; None where it is even."""
     rough = None if pattern in PRINTS else relief(pattern).rough
     return None if rough is None else _encoded(np.clip(roughness + rough, 0.05, 1), 70)
-
-
-def _jpeg(value: np.ndarray) -> bytes:
-    return _encoded(from_linear(value), QUALITY)
 
 
 def _encoded(value: np.ndarray, quality: int) -> bytes:

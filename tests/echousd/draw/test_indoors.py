@@ -448,6 +448,20 @@ def test_who_looks_into_a_mirror_sees_what_is_before_it():
     assert mirrored[..., 0].mean() > 2 * mirrored[..., 1].mean()
 
 
+@pytest.mark.parametrize(
+    ("eye", "thin", "red"), [((0.01, 2.5, 0), 1, True), ((0.01, 2.5, 0), 0, False), ((1.8, 0.4, 0), 1, False)]
+)
+def test_through_glass_one_sees_what_lies_behind_and_aslant_its_surface(eye, thin, red):
+    scenery, down = box_room(sky=1.0, **LAMP)
+    floor = (np.abs(scenery.triangles[..., 1]) < 0.1).all(1)
+    scenery = replace(scenery, flat_colors=np.where(floor[:, None], np.float32([0.7, 0.05, 0.05]), np.float32(0.6)))
+    for level in (0.06, 0.05):  # both sides of a pane
+        scenery = with_sheet(scenery, level_sheet(1.6, 1.6, level), thin=np.full(2, thin))
+    view = replace(down, matrix=view_matrix(np.array(eye), np.array([0.0, 0.06, 0.0])), half=0.05)
+    seen = trace(scenery, view, 16, rays=2).mean((0, 1))
+    assert (seen[0] > 2 * seen[1]) == red
+
+
 def test_a_glossy_floor_mirrors_the_window_and_more_so_aslant():
     pane = np.array([[(1.99, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.8, 0.0)]], np.float32)
     scenery, _ = box_room(sky=1.0, sun=None)
