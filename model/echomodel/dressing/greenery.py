@@ -55,9 +55,6 @@ def small_plant(size: Size, rng: np.random.Generator) -> list[Solid]:
     return _potted(size, str(rng.choice(species("table"))), rng.uniform(0.3, 0.42) * size[1], 0.27, rng)
 
 
-sill_plant = small_plant
-
-
 def _potted(size: Size, kind: str, tall: float, share: float, rng: np.random.Generator) -> list[Solid]:
     """A species in a pot that is `tall` metres high and whose rim's radius is a share of the plant's width."""
     radius = share * min(size[0], size[2])

@@ -14,6 +14,7 @@ PINCH, BELOW = 0.08, 0.2
 # Of a slumped cushion's height: below the first it does not lean, about as much as the last of its foot is flat. By how
 # much it is wider there.
 FOOT, SPREAD, FLAT = 0.15, 0.5, 0.1
+HEAD = 0.38  # of half a pillow's thickness that a head has left in its middle
 SEAM = 0.025  # of half a pillow's thickness that is left at its seams
 DROOP = 0.25  # of half a pillow's thickness that its corners hang down
 SUNK = 0.0115  # metres below its highest folds at most that things lie on a cover: half of it is about as high
@@ -41,7 +42,8 @@ class Pillow(Ball):
         thin = int(np.argmin(self.half))
         # a ring is one loop around the pillow at one u: over its front, back behind
         u, flat = u[:, :1], np.concatenate([v, v[:, -2:0:-1]], 1)
-        side = np.concatenate([full + SEAM, -full[:, -2:0:-1] - SEAM], 1) - DROOP * (u * flat) ** 2
+        slept = HEAD * (self.role == "pillow") * np.exp(-((v / 0.4) ** 2) - ((u - 0.1) / 0.5) ** 2)
+        side = np.concatenate([full * (1 - slept) + SEAM, -full[:, -2:0:-1] - SEAM], 1) - DROOP * (u * flat) ** 2
         side = side / max(1, np.abs(side).max())
         vertices, faces = loft(np.roll(np.stack([side, *outline(u, flat)], -1), thin, -1) * self.half)
         return vertices, outward(vertices, faces)
