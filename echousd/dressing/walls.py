@@ -29,7 +29,7 @@ RADIATORS = ("panel_radiator", "panel_radiator", "flat_radiator", "column_radiat
 BELOW, BEHIND = 0.14, 0.03  # metres of air between a window's sill and a radiator, and behind it
 PLUGGED = ("bed", "desk", "tv_stand")  # words of what has a socket beside it
 CURTAINS = ("curtain", "tied_curtain", "eyelet_curtain", "pleated_curtain", "sheer_curtain")  # of a room all are alike
-BLINDS = ("blind", "roman_blind", "roman_blind")  # as well; where it is wet, the first
+BLINDS = ("blind", "roman_blind")  # the first where it is wet, or where the style has no other: it is blank
 APRON = 0.14  # metres below the sill that others end at
 # Of how wide curtains hang, where something is beside one; of a rail, how far in both may hang there, less if short.
 BUNCHED, INWARD = (1.0, 0.75, 0.55), (0.0, 0.05, 0.1, 0.15, 0.2)
@@ -105,7 +105,7 @@ def _styled(setting: Setting, kinds: Sequence[str]) -> Sequence[str]:
 def _blind(setting: Setting, wall: Wall, window: Opening) -> None:
     """A blind, let down over a part of the pane."""
     rng, alike = setting.rng(window.name, "blind"), setting.rng("blinds")
-    kinds = BLINDS[:1] if setting.use == "wet" else _styled(setting, BLINDS)
+    kinds = BLINDS[:1] if setting.use == "wet" else _styled(setting, BLINDS[1:]) or BLINDS[:1]
     kind, variant = str(alike.choice(kinds)), int(alike.integers(1 << 30))
     tall, thick = round(window.height * float(rng.choice((0.2, 0.3, 0.4))), 3), KINDS[kind].low[2]
     size = np.array([round(window.width - 0.012, 3), tall, thick])
