@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -301,9 +301,6 @@ ABOVE, STANDING = 0.3, 0.6  # metres that stay free over a shelf, and before a m
 CLOCKS, WITH_SHELVES, COATS, MIRRORS = 0.4, 0.5, 0.3, 0.6
 
 
-SILL = 0.048  # metres from the face of a wall to the frame of a window
-
-
 def shelves(setting: Setting) -> None:
     """Up to two shelves on walls that have room, or niches in them, with books and small things, where it is dry."""
     done, rng = 0, setting.rng("shelves")
@@ -347,21 +344,6 @@ def coats(setting: Setting) -> None:
             spots = [(wall, along / wall.length) for along in (door.end + half, door.offset - half)]
             if _hung(setting, one, spots, 1.78 - float(one.size[1])):
                 return
-
-
-def sills(setting: Setting) -> None:
-    """Up to three small things side by side on the sill of a window, where nothing hangs or stands before them."""
-    for wall in walls_of(setting.floor) if setting.walls and not setting.use else ():
-        for window in (o for o in setting.openings if o.kind == "window" and o.edge == wall.edge and o.sill > LOW / 2):
-            rng = setting.rng(window.name, "sill")
-            along = window.offset + float(rng.uniform(0.1, 0.5)) * window.width
-            for kind in rng.permutation(TABLE["sills"])[: int(rng.integers(4))].tolist():
-                one = _new(kind, rng)
-                wide, _, deep = one.size.tolist()
-                place = wall.at(along + wide / 2, max(deep / 2 - SILL, 0.0), window.sill)
-                along += wide + float(rng.uniform(0.02, 0.08))
-                if along < window.end:
-                    setting.put_first([replace(one, position=place, yaw=wall.yaw)], floor=False)
 
 
 HUNG_OVER = {"coat_rack": "hung_coats", "towel_radiator": "towel"}  # a row's `top` -> what hangs from it

@@ -138,29 +138,6 @@ def test_pictures_stay_out_of_baths_and_off_balconies(use, monkeypatch):
     assert {KINDS[thing.kind].name for thing in room.placed} == ({"picture"} if not use else set())
 
 
-def test_small_things_stand_on_sills_between_curtains_and_before_the_frame():
-    kinds = set()
-    for seed in range(16):
-        room = setting(seed=seed, openings=[WINDOW])
-        walls.curtains(room)
-        hung = len(room.placed)
-        walls.sills(room)
-        (wall,) = (one for one in walls.walls_of(room.floor) if one.edge == WINDOW.edge)
-        for one in room.placed[hung:]:
-            kinds.add(one.kind)
-            way = one.position[[0, 2]] - wall.start
-            half = one.size[0] / 2
-            assert WINDOW.offset < way @ wall.along - half < way @ wall.along + half < WINDOW.end
-            assert (
-                -0.05 < way @ wall.inside - one.size[2] / 2 < way @ wall.inside < 0.04
-            )  # its middle is over the board
-            assert one.position[1] == WINDOW.sill
-            assert not any(one.footprint.intersects(other.footprint) for other in room.placed[:hung])
-    assert len(kinds) >= 5
-    walls.sills(room := setting(use="wet", openings=[WINDOW]))
-    assert not room.placed
-
-
 def test_all_windows_of_a_room_have_the_same_curtains_and_rooms_differ():
     windows = [Opening(f"window{k}", "window", 0, 0.4 + 2.0 * k, 0.9, 1.3, 0.9) for k in range(2)]
     found = set()
