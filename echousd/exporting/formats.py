@@ -357,7 +357,7 @@ def strip(layer: Sdf.Layer, properties: str | tuple[str, ...], schemas: str | tu
         for spec in prim_specs(layer):
             for name in [found.name for found in spec.properties if found.name.startswith(properties)]:
                 spec.RemoveProperty(spec.properties[name])
-            applied = spec.GetInfo("apiSchemas").GetAddedOrExplicitItems() if spec.HasInfo("apiSchemas") else []
+            applied = spec.GetInfo("apiSchemas").GetAddedOrExplicitItems()
             kept = [name for name in applied if not name.startswith(schemas)]
             if not kept:
                 spec.ClearInfo("apiSchemas")

@@ -312,12 +312,10 @@ class _Editor:
 
 def _holds_nothing_foreign(spec: Sdf.PrimSpec) -> bool:
     """Whether a prim spec holds what this project authors for a node or a relation and nothing else."""
-    listed = spec.GetInfo("apiSchemas") if spec.HasInfo("apiSchemas") else Sdf.TokenListOp()
-    apis = {*listed.explicitItems, *listed.prependedItems, *listed.appendedItems}
     own = {*usd.VALUE_TYPES, usd.SUBJECT, usd.OBJECT, usd.BETWEEN}
     return (
         not spec.nameChildren
         and set(spec.ListInfoKeys()) <= _OWN_INFO
-        and apis <= {*usd.NODE_APIS}
+        and {*spec.GetInfo("apiSchemas").GetAddedOrExplicitItems()} <= {*usd.NODE_APIS}
         and all(name in own or name.startswith(usd.FREE) for name in spec.properties.keys())  # noqa: SIM118
     )

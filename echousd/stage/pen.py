@@ -122,9 +122,8 @@ def ops(**steps: tuple[str, Any]) -> dict[str, Any]:
 
 def apply_apis(spec: Sdf.PrimSpec, *names: str) -> None:
     """Add schemas to those that a prim applies, where they are not among them."""
-    listed = spec.GetInfo("apiSchemas") if spec.HasInfo("apiSchemas") else Sdf.TokenListOp()
-    have = [*listed.explicitItems, *listed.prependedItems, *listed.appendedItems]
-    missing = [name for name in names if name not in have]
+    listed = spec.GetInfo("apiSchemas")  # an empty list where none is authored
+    missing = [name for name in names if name not in listed.GetAddedOrExplicitItems()]
     if not missing:
         return
     if listed.isExplicit:

@@ -117,7 +117,7 @@ def turn_up(layer: Sdf.Layer, theirs: Callable[[str], bool] = lambda path: False
     Raises ValueError for a transform that is not among ours.
     """
     root = layer.pseudoRoot
-    if root.HasInfo("upAxis") and root.GetInfo("upAxis") == "Z":
+    if root.GetInfo("upAxis") == "Z":
         return layer
     with Sdf.ChangeBlock():
         for spec in prim_specs(layer):
