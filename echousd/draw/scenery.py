@@ -297,8 +297,7 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False, halved: int = 0) -
         if mesh.category == "beam":
             above.append(part)
             continue
-        if np.ptp(points, axis=0).max(initial=0) < SMALL:
-            part["thin"][clear] = 1
+        part["thin"][clear] = 1
         if clear.any() and not clear.all():
             across = np.abs(area_normals(part["triangles"]))
             keep = ~clear | (across[:, [0, 2]].max(1) < np.maximum(GLAZED, 3 * across[:, 1]))

@@ -111,7 +111,8 @@ BEFORE, THICK = np.float32(2e-3), np.float32(0.016)
 # cosine by which that is less aside; how bright bars of the window are before the light.
 BEHIND, SEEN_BY, CLOSER, BAR = 0.05, 0.42, 6, 0.45
 MIRROR = 0.8  # gloss of what mirrors like glass with silver behind it
-SHEETS, RIMS = 12, 0.4  # of glass that one looks through; cosine below which it is seen itself: at rims
+# Of glass that one looks through; how white what it mirrors is, and its share straight on: aslant it is more.
+SHEETS, WHITE, CLEAR = 12, 0.8, 0.08
 
 
 def _met(world: World, pixel: np.ndarray, place: np.ndarray, first: Seen | None = None) -> tuple[np.ndarray, Seen]:
@@ -133,7 +134,6 @@ def _met(world: World, pixel: np.ndarray, place: np.ndarray, first: Seen | None 
         for glass in (True,) * SHEETS + (False,):  # through it one sees what is behind, in a mirror what is before
             looks = world.scenery.thin.take(part.face) == 1 if glass else world.scenery.gloss.take(part.face) > MIRROR
             some = np.flatnonzero(looks & (part.face >= 0))
-            some = some[-along(way.take(some, 1), part.normal.take(some, 1)) > (RIMS if glass else 0)]
             if not len(some):
                 continue
             on, normal = way.take(some, 1), part.normal.take(some, 1)
@@ -141,6 +141,12 @@ def _met(world: World, pixel: np.ndarray, place: np.ndarray, first: Seen | None 
             origin = part.point.take(some, 1) + BEFORE * (on if glass else normal)
             for own, other in zip(part, _seen(world, origin, on, first_hit(world, origin, on)), strict=True):
                 own[..., some] = other
+            if glass:
+                some, share = (
+                    some[bare := part.shown.take(some) == 0],
+                    CLEAR + (1 - CLEAR) * (1 + along(on, normal)) ** 3,
+                )
+                part.shown[some], part.glow[:, some] = share[bare], WHITE
         if first is not None:
             differs = np.flatnonzero(_other(world, part, first.of(rows)))
             part, rows = part.of(differs), rows.take(differs)
