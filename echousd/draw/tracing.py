@@ -142,11 +142,8 @@ def _met(world: World, pixel: np.ndarray, place: np.ndarray, first: Seen | None 
             for own, other in zip(part, _seen(world, origin, on, first_hit(world, origin, on)), strict=True):
                 own[..., some] = other
             if glass:
-                some, share = (
-                    some[bare := part.shown.take(some) == 0],
-                    CLEAR + (1 - CLEAR) * (1 + along(on, normal)) ** 3,
-                )
-                part.shown[some], part.glow[:, some] = share[bare], WHITE
+                bare, share = part.shown.take(some) == 0, CLEAR + (1 - CLEAR) * (1 + along(on, normal)) ** 3
+                part.shown[some[bare]], part.glow[:, some[bare]] = share[bare], WHITE
         if first is not None:
             differs = np.flatnonzero(_other(world, part, first.of(rows)))
             part, rows = part.of(differs), rows.take(differs)
