@@ -147,7 +147,8 @@ def _couch(
     else:
         thick, turn = 0.12 + 0.08 * style.softness, rotation(x=-0.12 - 0.3 * style.rake)
         far, near, high = z0 + frame - 0.2 * thick, z0 + frame + 0.8 * thick, h if back == "pads" else 0.94 * h
-        parts += _cushions(-inner, inner, seat - 0.045, high, far, near, seats, style, turn=turn, role="back")
+        loose = max(seats, round(inner / 0.5))  # behind one long seat, too
+        parts += _cushions(-inner, inner, seat - 0.045, high, far, near, loose, style, turn=turn, role="back")
     if back == "roll" and seats > 1 and not chaise:
         place, turn = (inner - 0.085, seat + 0.08, z0 + 0.7 * frame), rotation(x=np.pi / 2)
         parts += both(padded(place, 0.08, min(0.52, 0.6 * d), rounding=0.02, turn=turn, role="cushion"))
