@@ -211,7 +211,7 @@ def leather() -> Relief:
 def plaster() -> Relief:
     """Plaster under matt paint: nearly even, hardly flat, the grain of the roller when one stands before it."""
     fine, soft = noise(71, 110.0, 110.0, 4.0), noise(72, 4.0, 3.0, 3.0)
-    return Relief(1 + 0.004 * fine + 0.01 * soft, 0.0001 * fine + 0.0013 * soft)
+    return Relief(1 + 0.004 * fine + 0.003 * soft, 0.0001 * fine + 0.0004 * soft)
 
 
 def papered() -> Relief:

@@ -67,12 +67,14 @@ def bedding(
     thick = 0.2
     parts: list[Solid] = [box((-w / 2, low, z0), (w / 2, low + thick, z1), "linen", 0.05, "mattress")]
     each, rng = w / pillows, choices.stream("pattern")
-    rows = [(0.13, 0.31, 0.4), (0.24, 0.14, 1.2)] if choices.chance("count", 0.5) else [(0.115, 0.24, 0.35)]
+    stacked = choices.chance("count", 0.5)  # fuller, the second row on the first; one row leans at the head
+    rows = [(0.13, 0.27, -0.5), (0.24, 0.1, -1.25)] if stacked else [(0.115, 0.24, 0.35)]
+    full, power = (0.13, 2.5) if stacked else (0.105, 3.2)
     for (high, off, lean), i in product(rows, range(pillows)):
         place = (-w / 2 + each * (i + 0.5), low + thick + high, z0 + off)
         turn = rotation(x=lean, y=rng.uniform(-0.08, 0.08))
-        half = (min(each * 0.46, 0.38), 0.105, 0.25)
-        parts.append(replace(pillow(place, half, "linen", "pillow", turn), power=3.2))
+        half = (min(each * 0.46, 0.38), full, 0.25)
+        parts.append(replace(pillow(place, half, "linen", "pillow", turn), power=power))
     start = z0 + (z1 - z0) * choices.between("spread", 0.28, 0.42)
     x, y, top = w * 0.53 + 0.02 + 0.03 * style.softness, low - 0.11, low + thick + 0.09
     end = z1 + (0.08 + 0.02 * style.softness if falls else 0.03)
