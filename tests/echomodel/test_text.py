@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
 from collections.abc import Sequence
 
 import pytest
@@ -48,28 +47,21 @@ def test_a_damaged_cache_is_computed_anew(tmp_path) -> None:
 
 
 def test_absent_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    real = builtins.__import__
+    def absent(name: str) -> None:
+        raise ImportError(name)
 
-    def absent(name: str, *args: object, **kwargs: object) -> object:
-        if name == "open_clip":
-            raise ImportError(name)
-        return real(name, *args, **kwargs)
-
-    monkeypatch.setattr(builtins, "__import__", absent)
+    monkeypatch.setattr("echomodel.late.import_module", absent)
     with pytest.raises(TextEncoderError, match=r"need the package open_clip_torch: pip install 'echousd\[text\]'"):
         ClipTextEncoder()(["chair"])
 
 
 def test_a_package_that_cannot_be_imported_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """What pip installs as torchvision may be made for another build of torch."""
-    real = builtins.__import__
 
-    def broken(name: str, *args: object, **kwargs: object) -> object:
-        if name == "open_clip":
-            raise RuntimeError("operator torchvision::nms does not exist")
-        return real(name, *args, **kwargs)
+    def broken(name: str) -> None:
+        raise RuntimeError("operator torchvision::nms does not exist")
 
-    monkeypatch.setattr(builtins, "__import__", broken)
+    monkeypatch.setattr("echomodel.late.import_module", broken)
     with pytest.raises(
         TextEncoderError, match=r"cannot be imported \(operator torchvision::nms does not exist\); torch 2"
     ):

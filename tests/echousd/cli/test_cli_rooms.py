@@ -47,7 +47,8 @@ def test_flat_samples_z_up_and_boxes(graph, tmp_path, echousd_command):
     out = tmp_path / "room.usdc"
     words = ("--flat", "--layouts", 2, "--up-axis", "z", "--shapes", "boxes", "--no-place", "--walls")
     done = echousd_command("generate", graph, "-o", out, *words)
-    assert done.code == 0, done.err
+    assert done.code == 1, done.err  # a wardrobe is drawn into a wall, and nobody places it
+    assert "collide  wardrobe and Wall_4 by" in done.out
     stage = Usd.Stage.Open(str(out))
     assert stage.GetPrimAtPath("/Room").GetVariantSet("layout").GetVariantNames() == ["layout_0", "layout_1"]
     assert stage.GetMetadata("upAxis") == "Z"

@@ -27,7 +27,7 @@ from echousd.texturing.job import job_mesh
 from echousd.texturing.obj import glb_bytes
 from echousd.texturing.results import read_results
 
-SIDE = 768  # pixels of a picture for all
+SIDE, SQUARE = 768, 320  # pixels of a picture for all, and of one for each object or all small things
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def small(tmp_path_factory):
 def generic(room, tmp_path_factory):
     """The room's job for any tool, its small things as one object, and the folder it is in."""
     folder = tmp_path_factory.mktemp("generic") / "job"
-    return export_job(room, folder, "generic", dressing="grouped", resolution=256), folder
+    return export_job(room, folder, "generic", dressing="grouped", resolution=SQUARE), folder
 
 
 def copied(root, tmp_path):
@@ -100,7 +100,7 @@ def test_charts_are_unique_and_inside(generic):
         corners = job_mesh(folder, thing).corners
         assert corners.min() >= 0
         assert corners.max() <= 1
-        _, bary, place = texel_faces(corners, 256)
+        _, bary, place = texel_faces(corners, SQUARE)
         inner = place[(bary > 1e-6).all(1)]
         assert len(np.unique(inner, axis=0)) == len(inner), thing.name
 
