@@ -155,8 +155,8 @@ def bare_corners(setting: Setting) -> None:
 
 
 RULES = (
-    floors.rugs, walls.hung_up, walls.curtains, walls.radiators, walls.sockets, walls.pictures, upholstery.throws,
-    upholstery.cushions, upholstery.on_covers, upholstery.bed_cushions, tabletops.tabletops,
+    floors.rugs, walls.hung_up, walls.curtains, walls.radiators, walls.sills, walls.sockets, walls.pictures,
+    upholstery.throws, upholstery.cushions, upholstery.on_covers, upholstery.bed_cushions, tabletops.tabletops,
     floors.clusters, walls.coats, walls.tall_mirror, walls.shelves, walls.clock, floors.cables,
     bare_walls, bare_corners,
 )  # fmt: skip

@@ -34,6 +34,7 @@ class Story:
     beds: tuple[Wish, ...]
     seats: tuple[Wish, ...]
     floor: tuple[Wish, ...]
+    sills: tuple[Wish, ...]
 
 
 @cache
@@ -41,7 +42,7 @@ def story(resident: str = "") -> Story:
     """The story of one of `RESIDENTS`, of anyone where nobody is told."""
     rows = TABLE["anyone"] | TABLE.get(resident, {})
     tops = TABLE["anyone"]["tops"] | TABLE.get(resident, {}).get("tops", {})
-    wishes = {where: tuple(map(_wish, rows[where])) for where in ("beds", "seats", "floor")}
+    wishes = {where: tuple(map(_wish, rows[where])) for where in ("beds", "seats", "floor", "sills")}
     return Story({top: tuple(map(_wish, of)) for top, of in tops.items()}, tuple(rows["shelves"]), **wishes)
 
 

@@ -11,7 +11,7 @@ from echomodel.dressing import KINDS, usual
 from echomodel.late import Late
 from echomodel.triangles import area_normals, spans_of
 from echousd.dressing.setting import APART, EDGE, Setting, Standing, Thing, around, rectangle
-from echousd.dressing.stories import TABLE
+from echousd.dressing.stories import TABLE, Wish
 from echousd.shapes.geometry import Geometry
 
 shelved_books = Late("echousd.dressing.shelved:shelved_books")
@@ -149,24 +149,25 @@ def tabletops(setting: Setting) -> None:
         footprint = float(host.size[0] * host.size[2])
         tops = [s for s in levels if s.area.area > 0.3 * footprint and s.host.position[1] + s.y < EYE]
         if name in setting.story.tops and tops:
-            _top(setting, host, tops[0], name)
+            decked(setting, host, tops[0], setting.story.tops[name])
         if name in TABLE["stocked"] or (host.row.role == "storage" and host.row.look in CASES):
             for surface in levels:
                 if surface is not (tops[0] if tops and name in setting.story.tops else None):
                     stocked(setting, host, surface)
 
 
-def _top(setting: Setting, host: Standing, surface: Surface, name: str) -> None:
+def decked(setting: Setting, host: Standing, surface: Surface, wishes: Sequence[Wish]) -> None:
+    """Put what a story wishes on a level; first a television in the middle of a stand for one, where there is none."""
     rng = setting.rng(host.name, "top")
     taken: set[str] = set()
-    if name == "tv_stand" and not setting.of("screen"):  # a television in the middle, as wide as looks good on it
+    if host.row.top == "tv_stand" and not setting.of("screen"):  # as wide as looks good on it
         variant = int(setting.rng("television").integers(1 << 30))
         for share in (0.6, 0.5, 0.4):
             wide = round(min(share * float(host.size[0]), KINDS["television"].high[0]), 2)
             size, spots = np.array([wide, round(0.56 * wide + 0.045, 3), 0.2]), ((0, -0.3), (0, 0), (0.2, 0), (-0.2, 0))
             if surface.put(setting, "television", spots, size=size, variant=variant):
                 break
-    for number, wish in enumerate(setting.story.tops[name]):
+    for number, wish in enumerate(wishes):
         order = [str(k) for k in rng.permutation(wish.of)]
         turn = float(rng.uniform(-0.12, 0.12))
         if not setting.has(wish.share, rng) or (wish.needs and wish.needs not in taken):

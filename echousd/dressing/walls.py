@@ -12,8 +12,8 @@ from echomodel.dressing import KINDS, printed, usual
 from echomodel.dressing import thing as solids_of
 from echomodel.openings import Opening, direction, edge_lengths, inward_normal
 from echousd.dressing.setting import Setting, Standing, Thing, rectangle, standing
-from echousd.dressing.stories import TABLE
-from echousd.dressing.tabletops import stocked, surfaces
+from echousd.dressing.stories import TABLE, Wish
+from echousd.dressing.tabletops import decked, stocked, surfaces
 from echousd.shapes.fittings import NICHE, RAIL
 from echousd.shapes.geometry import Origin
 from echousd.shapes.joinery import assembled
@@ -317,14 +317,35 @@ def shelves(setting: Setting) -> None:
         spot = (middle + aside * float(rng.choice((-1, 1)))) / wall.length
         lows = (low + 0.1, low + 0.1 - step) if kind != "niche" and rng.random() < DOUBLE else (low,)
         for board in [found for at in lows if (found := _hung(setting, one, [(wall, spot)], at, above=ABOVE))]:
-            solids, name = solids_of(kind, size, np.random.default_rng(variant)), f"wall shelf {done + 1}"
-            made = assembled(solids, size, faces=1200, origin=Origin("dressing"))
-            carrier = setting.carriers[name] = standing(name, "shelf", size, board.position, board.yaw, made)
-            for level in surfaces(carrier)[kind == "niche" :]:
-                stocked(setting, carrier, level)
             done += 1
+            _carries(setting, board, f"wall shelf {done}")
         if done > 1:
             return
+
+
+SILLS = 0.97 - 0.06 * np.arange(9)  # shares of a window's width that a deep board may have
+
+
+def sills(setting: Setting) -> None:
+    """A deep board below every window, as wide as furniture and curtains leave it, and what stands on it."""
+    kind, rng = "window_sill", setting.rng("sills")
+    size, variant = usual(kind, rng)
+    for wall in walls_of(setting.floor) if setting.walls and setting.use != "outdoor" else ():
+        for window in (o for o in setting.openings if o.kind == "window" and o.edge == wall.edge and o.sill):
+            place = wall.at((window.offset + window.end) / 2, float(size[2]) / 2 + 0.001, window.sill + 0.002 - size[1])
+            sizes = (np.round([share * window.width, *size[1:]], 3) for share in SILLS)
+            boards = (Thing(kind, size, place, wall.yaw, "", variant) for size in sizes)
+            if board := setting.put_first(boards, floor=False):
+                _carries(setting, board, f"sill {window.name}", setting.story.sills)
+
+
+def _carries(setting: Setting, board: Thing, name: str, wishes: Sequence[Wish] = ()) -> None:
+    """Put things on a board, as wished or as on a shelf."""
+    solids = solids_of(board.kind, board.size, np.random.default_rng(board.variant))
+    made = assembled(solids, board.size, faces=1200, origin=Origin("dressing"))
+    carrier = setting.carriers[name] = standing(name, "shelf", board.size, board.position, board.yaw, made)
+    for level in surfaces(carrier)[board.kind == "niche" :]:
+        decked(setting, carrier, level, wishes) if wishes else stocked(setting, carrier, level)
 
 
 def clock(setting: Setting) -> None:

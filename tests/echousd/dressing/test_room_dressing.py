@@ -24,7 +24,7 @@ from echousd.dressing import floors, soft_tops, tabletops, upholstery
 from echousd.dressing.dress import RULES, TALL, Dressing, dress, dressed, setting_of
 from echousd.dressing.setting import Setting, Thing, geometry_of, meets, standing
 from echousd.dressing.soft_tops import STEP, Seat
-from echousd.dressing.walls import BLINDS, CURTAINS, RADIATORS, curtains, radiators, sockets
+from echousd.dressing.walls import BLINDS, CURTAINS, RADIATORS, curtains, radiators, sills, sockets
 from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.layers.compose import room_files
 from echousd.options import RoomOptions
@@ -207,6 +207,26 @@ def test_no_radiator_stands_behind_furniture_or_below_a_window_that_reaches_down
         setting = Setting(objects, SQUARE, (Opening("window", "window", 0, 1.1, 1.8, 1.3, sill),), 2.7, True, False, 0)
         radiators(setting)
         assert setting.placed == []
+
+
+@pytest.mark.parametrize(("tall", "wide"), [(0.7, 1.7), (1.1, 0.0)])
+def test_a_window_has_a_deep_sill_and_things_on_it_where_nothing_is_in_the_way(tall, wide):
+    """They stand before the wall: its solids are hulls for many simulators, which fill the recess of a window."""
+    window, desk = Opening("window", "window", 0, 1.1, 1.8, 1.3, 0.9), block("desk", (1.4, tall, 0.7), -1.64)
+    setting = Setting({"desk": desk}, SQUARE, (window,), 2.7, True, True, 0)
+    sills(setting)
+    assert [thing.size[0] for thing in setting.placed[:1]] == pytest.approx([wide] * (wide > 0), abs=0.1)
+    for thing in setting.placed:
+        assert -2.0 < thing.footprint.bounds[1] < thing.footprint.bounds[3] < -1.86
+    carried = [thing for thing in setting.placed if thing.on]
+    assert (len(carried) > 1) == (wide > 0)
+    assert all(thing.position[1] == pytest.approx(0.902) and not KINDS[thing.kind].fixed for thing in carried)
+    curtained = Setting({}, SQUARE, (window,), 2.7, True, True, 0)
+    curtains(curtained)
+    hung = len(curtained.placed)
+    sills(curtained)
+    assert 0.8 < curtained.placed[hung].size[0] < 1.3  # between the curtains
+    assert not any(curtained.placed[hung].footprint.intersects(one.footprint) for one in curtained.placed[:hung])
 
 
 def test_a_bed_has_a_socket_in_its_wall_that_nothing_hides():

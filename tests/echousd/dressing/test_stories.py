@@ -70,7 +70,8 @@ def test_every_resident_has_a_story_of_kinds_and_tops_that_there_are():
     words = {word for row in vocabulary().categories for word in (row.role, row.top, *row.invites)}
     for who in ("", *RESIDENTS):
         told = story(who)
-        wishes = [*told.beds, *told.seats, *told.floor, *(wish for top in told.tops.values() for wish in top)]
+        lists = (told.beds, told.seats, told.floor, told.sills, *told.tops.values())
+        wishes = [wish for one in lists for wish in one]
         assert {kind for wish in wishes for among in (wish.of, *wish.beside) for kind in among} <= {*KINDS}
         assert {*told.shelves} <= {*KINDS}
         assert set(told.tops) <= tops
