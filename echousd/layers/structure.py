@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,11 +18,11 @@ from echomodel.vocabulary import vocabulary
 from echousd.dressing.walls import behind, walls_of
 from echousd.layers import assets
 from echousd.room import RoomData
-from echousd.shapes.fittings import BEAM, PLAIN, Millwork, millwork_of
+from echousd.shapes.fittings import BEAM
 from echousd.shapes.geometry import CREASE, Mass
 from echousd.shapes.matter import hull_moments
 from echousd.shapes.surface import Surface, surfaces
-from echousd.shapes.walls import COVED, THICKNESS, ShellPart, ShellPiece, slab, wall_name, walls
+from echousd.shapes.walls import COVED, THICKNESS, ShellPart, ShellPiece, millwork, slab, wall_name, walls_of_room
 from echousd.stage import encoding
 from echousd.stage.paths import OPENINGS, SHELL, piece_name
 from echousd.stage.pen import Pen, ops
@@ -113,15 +113,10 @@ def shell_prims(room: RoomData, bare: frozenset[str] = frozenset(), cuts: Sequen
     recesses of the walls."""
     parts = [slab("Floor", room.floor, -THICKNESS)]
     if room.options.walls:
-        spec = room.graph.room
-        outdoor = vocabulary().room_type(spec.type).use == "outdoor"
-        parts += walls(
-            room.corners, room.height, spec.openings, bare, outdoor=outdoor, thickness=spec.walls,
-            millwork=millwork(room), cuts=cuts,
-        )  # fmt: skip
+        parts += walls_of_room(room.graph, room.corners, room.height, room.provenance.seed, bare, cuts)
     if room.options.ceiling:
         parts.append(slab("Ceiling", room.corners, room.height))
-    if (look := millwork(room).beams) and room.options.walls and room.height >= COVED:
+    if (look := millwork(room.graph, room.provenance.seed).beams) and room.options.walls and room.height >= COVED:
         size, position, yaw = (np.asarray(v, float) for v in (room.boxes.size, room.boxes.position, room.boxes.yaw))
         tall = position[:, 1] + size[:, 1] > room.height - BEAM[1]
         plans = shapely.polygons(footprints(size, position, yaw)[tall])
@@ -132,16 +127,6 @@ def shell_prims(room: RoomData, bare: frozenset[str] = frozenset(), cuts: Sequen
     coverings = {"Floor": floor_slot(room)} | covered_walls(room)
     forms = iter(surfaces([form for part in parts for form in _forms(part, coverings)]))
     return [prim for part in parts for prim in _prims(part, SHELL, Kind.Tokens.component, forms)]
-
-
-def millwork(room: RoomData) -> Millwork:
-    """How the doors and windows of a room are made, as its seed draws it; in a home all are alike."""
-    if room.graph.room.walls:
-        return PLAIN
-    slept = any(vocabulary().category(node.category).role == "bed" for node in room.graph.nodes)
-    use = vocabulary().room_type(room.graph.room.type).use
-    made = millwork_of(room.provenance.seed, room.graph.room.style, private=slept or use == "wet")
-    return replace(made, dado="") if use else made
 
 
 def shell_layer(built: Sequence[ShellPrim], data: Mapping[str, Any], openings: Sequence[Opening] = ()) -> Sdf.Layer:

@@ -1,6 +1,6 @@
 """Which things run into each other, and how deep: by what is seen of them, which boxes and colliders are not."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import starmap
 
 import numpy as np
@@ -8,9 +8,10 @@ import numpy as np
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import axes, upright
 from echomodel.triangles import Mesh, along, area_normals, bounds_of, cross, joined, spans_of, spread
+from echousd.graph import SceneGraph
 from echousd.make.scene import Scene
 from echousd.place.geometry import IN_WALL, SOLID, TOUCH, Collision, separation
-from echousd.shapes.geometry import Part
+from echousd.shapes.geometry import Geometry
 from echousd.stage.contents import Shape, upright_box
 
 NEAR = 0.05  # metres between two boxes that are one
@@ -25,14 +26,21 @@ def shape_at(mesh: Mesh, position: np.ndarray, yaw: float) -> Shape:
     return Shape(points, mesh.faces, *upright_box(points, turn))
 
 
-def told(scene: Scene, boxes: Boxes, pieces: Sequence[Sequence[Part]], met: np.ndarray) -> tuple[Collision, ...]:
-    """Of pairs (p, 2) whose solids meet, those that `check` will name, by its measure, deepest first."""
+def told(
+    scene: Scene, graph: SceneGraph, boxes: Boxes, geometry: Mapping[str, Geometry], met: Sequence[tuple[int, int]],
+    at_walls: Sequence[tuple[int, int]],
+) -> tuple[Collision, ...]:  # fmt: skip
+    """Of pairs of things that meet, and of things and numbers of walls, those that `check` names, by its measure,
+    deepest first."""
     # in the order of stages, body by body: samples of a surface are then the same
-    meshes = [joined([part.mesh for part in sorted(parts, key=lambda one: one.body)]) for parts in pieces]
+    pieces = [sorted(geometry[name].parts, key=lambda one: one.body) for name in graph.names]
+    meshes = [joined([part.mesh for part in parts]) for parts in pieces]
     placed = zip(meshes, np.asarray(boxes.position, float), boxes.yaw.tolist(), strict=True)
-    shapes = [*starmap(shape_at, placed), *(shape_at(mesh, np.zeros(3), 0.0) for mesh in scene.fittings)]
-    things, fitted = list(zip(scene.names, shapes, strict=True)), met.max(1) >= len(meshes)
-    found = hits(things, met[~fitted], SOLID, boxes=True) + hits(things, met[fitted], IN_WALL, boxes=False)
+    shapes = list(zip(graph.names, starmap(shape_at, placed), strict=True))
+    walls = ((wall.name, joined([piece.mesh for piece in wall.everything])) for wall in scene.walls)
+    shapes += [(name, shape_at(mesh, np.zeros(3), 0.0)) for name, mesh in walls]
+    found = hits(shapes, np.array(met), SOLID, boxes=True)
+    found += hits(shapes, np.array([(one, len(meshes) + wall) for one, wall in at_walls]), IN_WALL, boxes=False)
     return tuple(sorted(found, key=lambda hit: -hit.depth))
 
 

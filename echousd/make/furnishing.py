@@ -27,6 +27,7 @@ from echousd.shapes.sources.mixing import check_sources, mixed_shapes
 from echousd.shapes.sources.named import names_models, source_of
 from echousd.shapes.sources.source import Retrieved, ShapeRequest
 from echousd.shapes.styles import asset_names
+from echousd.shapes.walls import walls_of_room
 
 if TYPE_CHECKING:
     from echomodel.graph import GraphEdit
@@ -115,11 +116,12 @@ def furnished(brief: Brief) -> Room:
     assets = own_names(brief.assets, asset_names(made.owners, {node.name: node.category for node in graph.nodes}))
     layouts = as_made(layouts)
     floor = room_floor(graph, layouts)
+    edge = floor if graph.room.corners is None else graph.room.corners
+    walls = walls_of_room(graph, edge, graph.room.tall, brief.made_by.seed) if asked.walls else []
     for rest in reversed(range(ROUNDS if asked.place else 1)):
         with timer.stage("place"), one_thread():
             pins = [with_boxes(graph, boxes, moving) for boxes in there]
-            built = {"walls": asked.walls, "place": asked.place}
-            layouts, outcomes = cleared_layouts(pins, as_made(layouts), geometry, floor, **built)
+            layouts, outcomes = cleared_layouts(pins, as_made(layouts), geometry, floor, walls, place=asked.place)
         way = brief.in_the_way(layouts[0], outcomes[0], moving) if search is not None and rest else set()
         if not way:
             break

@@ -12,9 +12,10 @@ from echomodel.boxes2d import footprints, upright
 from echomodel.objective import Plan
 from echomodel.triangles import Mesh, bounds_of, connected_pieces
 from echousd.graph import SceneGraph
+from echousd.place.geometry import IN_WALL
 from echousd.shapes.geometry import Geometry
 from echousd.shapes.hulls import FLUSH, Solids, depth, forbidden_moves
-from echousd.shapes.walls import walls as walls_of
+from echousd.shapes.walls import ShellPart
 
 REACH = 0.5  # metres that a piece is moved at most in all
 NEAR = 0.01  # metres within which solids are looked at first: most things at most touch
@@ -36,8 +37,7 @@ class Scene:
     level: Sequence[BaseGeometry]  # n polygons, where the top of each is: a desk with a shelf behind has it there alone
     floor: shapely.Polygon  # the floor, a little wider
     bounds: np.ndarray  # (s, 2, 3) float, boxes of everything
-    names: Sequence[str]  # s names, those of walls for what they hold
-    fittings: Sequence[Mesh]  # s - n meshes of these, in the room
+    walls: Sequence[ShellPart]  # with what is in them
     # pair -> forbidden moves of its first against its second from where both stood at first
     known: dict[tuple[int, int], BaseGeometry] = field(default_factory=dict)
 
@@ -70,6 +70,16 @@ class Scene:
                     found.append(((i, k), far))
         return sorted(found, key=lambda hit: -hit[1])
 
+    def in_walls(self, moves: np.ndarray) -> list[tuple[int, int]]:
+        """Things, and numbers of walls that they may reach into, or into what is in them, after moves (n, 2)."""
+        low, high = self.bounds[: len(moves)].swapaxes(0, 1) + np.insert(moves, 1, 0.0, axis=1)
+        met = []
+        for number, wall in enumerate(self.walls):
+            start, end = np.array([bounds_of(piece.mesh.vertices) for piece in wall.everything]).swapaxes(0, 1)
+            shared = np.minimum(high[:, None], end) - np.maximum(low[:, None], start)
+            met += [(one, number) for one in np.flatnonzero((shared.min(2) > IN_WALL).any(1)).tolist()]
+        return met
+
     def _against(self, pair: tuple[int, int], way: np.ndarray, reach: float) -> BaseGeometry:
         i, k = pair
         if k < len(self.carrier) and (self.carrier[i] == k or self.carrier[k] == i):
@@ -99,31 +109,25 @@ class Scene:
 
 
 def scene_of(
-    graph: SceneGraph, room: Plan, geometry: Mapping[str, Geometry], floor: np.ndarray, *, walls: bool
+    graph: SceneGraph, room: Plan, geometry: Mapping[str, Geometry], floor: np.ndarray, walls: Sequence[ShellPart]
 ) -> Scene:
     """The scene of a layout; arguments as `cleared`, `room`: its plan."""
     nodes, size, position, yaw = graph.nodes, room.size, room.position, room.yaw
+    placed = zip(nodes, upright(yaw), position, strict=True)
     solids = [
-        [
-            np.asarray(one.mesh.vertices, float) @ upright(yaw[i]).T + position[i]
-            for one in geometry[node.name].colliders
-        ]
-        for i, node in enumerate(nodes)
+        [np.asarray(one.mesh.vertices, float) @ turn.T + at for one in geometry[node.name].colliders]
+        for node, turn, at in placed
     ]
-    plan = floor if graph.room.corners is None else graph.room.corners
-    height = graph.room.tall
-    built = walls_of(plan, height, graph.room.openings, thickness=graph.room.walls) if walls else []
     # what stands before the walls: sills, casings, leaves; walls themselves are the floor's edge
-    fitted = ((part.name, piece) for part in built for filled in part.inner for piece in filled.pieces)
-    shell = [(name, piece.mesh) for name, piece in fitted if piece.solid]
-    everything = [*solids, *(_boards(mesh) for _, mesh in shell)]
+    fitted = (piece for part in walls for filled in part.inner for piece in filled.pieces)
+    everything = [*solids, *(_boards(piece.mesh) for piece in fitted if piece.solid)]
+    fixed = [node.locked or node.position is not None for node in nodes] + [True] * (len(everything) - len(nodes))
     return Scene(
-        everything, np.array([node.locked or node.position is not None for node in nodes] + [True] * len(shell)),
+        everything, np.array(fixed),
         room.carrier, room.anchor, yaw, room.of("seat"), np.sqrt(size[:, 0] * size[:, 2]),
         [shapely.Polygon(corner) for corner in footprints(size, position, yaw)],
         [_level(pieces) for pieces in solids], shapely.Polygon(floor).buffer(EDGE, join_style="mitre"),
-        np.array([bounds_of(np.concatenate(pieces)) for pieces in everything]),
-        [*graph.names, *(wall for wall, _ in shell)], [mesh for _, mesh in shell],
+        np.array([bounds_of(np.concatenate(pieces)) for pieces in everything]), walls,
     )  # fmt: skip
 
 

@@ -95,23 +95,12 @@ def place(
 
 
 def place_boxes(
-    categories: Sequence[str],
-    size: np.ndarray,
-    position: np.ndarray,
-    yaw: np.ndarray,
-    triplets: np.ndarray,
-    *,
-    floor_polygon: np.ndarray | None = None,
-    height: float | None = None,
-    fixed: np.ndarray | None = None,
-    rigid: np.ndarray | None = None,
-    turned: np.ndarray | None = None,
-    openings: Sequence[Opening] = (),
-    stated: tuple[Stated, ...] = (),
-    rules: str = "strict",
-    config: PlaceConfig | None = None,
+    categories: Sequence[str], size: np.ndarray, position: np.ndarray, yaw: np.ndarray, triplets: np.ndarray, *,
+    floor_polygon: np.ndarray | None = None, height: float | None = None, fixed: np.ndarray | None = None,
+    rigid: np.ndarray | None = None, turned: np.ndarray | None = None, openings: Sequence[Opening] = (),
+    stated: tuple[Stated, ...] = (), rules: str = "strict", config: PlaceConfig | None = None,
     begun: dict[bytes, Arranged] | None = None,
-) -> PlacedBoxes:
+) -> PlacedBoxes:  # fmt: skip
     """Move and size boxes as little as possible until relations, collisions, floor, walls and support are right.
 
     Arguments:

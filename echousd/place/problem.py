@@ -190,22 +190,12 @@ def stacked(
     size: np.ndarray, position: np.ndarray, carrier: np.ndarray, height: float | None, fixed: np.ndarray
 ) -> np.ndarray:
     """(n, 3) float: positions with each bottom on the floor or its carrier's top, and ceiling things at the ceiling."""
-    out = position.copy()
-    done = fixed.copy()
-
-    def put(i: int) -> float:
-        if not done[i]:
-            done[i] = True
-            if carrier[i] >= 0:
-                out[i, 1] = put(int(carrier[i]))
-            elif carrier[i] == ON_FLOOR:
-                out[i, 1] = 0.0
-            elif carrier[i] == ON_CEILING and height is not None:
-                out[i, 1] = height - size[i, 1]
-        return float(out[i, 1] + size[i, 1])
-
-    for i in range(len(size)):
-        put(i)
+    out, tall = position.copy(), size[:, 1]
+    hung = position[:, 1] if height is None else height - tall
+    out[:, 1] = np.where(carrier == ON_FLOOR, 0.0, np.where(carrier == ON_CEILING, hung, position[:, 1]))
+    out[fixed, 1] = position[fixed, 1]
+    for _ in range(len(size)):  # at most so many stand on one another
+        out[:, 1] = np.where((carrier >= 0) & ~fixed, (out[:, 1] + tall)[np.maximum(carrier, 0)], out[:, 1])
     return out
 
 

@@ -136,15 +136,9 @@ def unmet(at: Linearised) -> int:
 
 
 def newton(
-    rows: Matrix,
-    value: np.ndarray,
-    equal: np.ndarray,
-    stiffness: np.ndarray,
-    weight: np.ndarray,
-    moved: np.ndarray,
-    limit: np.ndarray,
-    damping: float,
-) -> np.ndarray:
+    rows: Matrix, value: np.ndarray, equal: np.ndarray, stiffness: np.ndarray, weight: np.ndarray, moved: np.ndarray,
+    limit: np.ndarray, damping: float,
+) -> np.ndarray:  # fmt: skip
     """Exact minimiser of 1/2 |moved + d|^2_W + damping' |d|^2 + sum rho/2 hinge(-(value + rows d))^2 over d.
 
     Arguments:

@@ -10,8 +10,10 @@ from echomodel.furniture.solids import Joint
 from echomodel.late import lates
 from echomodel.openings import Opening, direction, edge_lengths, inward_normal, signed_area
 from echomodel.triangles import Mesh, joined
+from echomodel.vocabulary import vocabulary
+from echousd.graph import SceneGraph
 from echousd.shapes import fittings
-from echousd.shapes.fittings import DADO, NICHE, PLAIN, WALL, Millwork
+from echousd.shapes.fittings import DADO, NICHE, PLAIN, WALL, Millwork, millwork_of
 from echousd.stage.paths import piece_name
 
 bay_window, door_glass, door_track, stands_out = lates(
@@ -42,6 +44,11 @@ class ShellPart:
     pieces: tuple[ShellPiece, ...]  # its meshes
     inner: "tuple[ShellPart, ...]" = ()  # parts that belong to it
     joint: Joint | None = None  # how it moves against the part that it belongs to, None = not at all
+
+    @property
+    def everything(self) -> tuple[ShellPiece, ...]:
+        """Its meshes and those of all parts that belong to it."""
+        return sum((part.everything for part in self.inner), self.pieces)
 
 
 def walls(
@@ -87,6 +94,26 @@ def walls(
             inner.append(_filled(name, opening, frame, length, rail, float(deep[edge]), own, both=not thickness))
         parts.append(ShellPart(name, "wall", tuple(pieces), tuple(inner)))
     return parts
+
+
+def walls_of_room(
+    graph: SceneGraph, corners: np.ndarray, height: float, seed: int, bare: frozenset[str] = frozenset(),
+    cuts: Sequence[Opening] = (),
+) -> list[ShellPart]:  # fmt: skip
+    """The `walls` of a room as its seed makes them; `corners`: (k, 2) float of its floor, metres."""
+    spec, outdoor = graph.room, vocabulary().room_type(graph.room.type).use == "outdoor"
+    made, deep = millwork(graph, seed), spec.walls
+    return walls(corners, height, spec.openings, bare, outdoor=outdoor, thickness=deep, millwork=made, cuts=cuts)
+
+
+def millwork(graph: SceneGraph, seed: int) -> Millwork:
+    """How the doors and windows of a room are made, as its seed draws it; in a home all are alike."""
+    if graph.room.walls:
+        return PLAIN
+    slept = any(vocabulary().category(node.category).role == "bed" for node in graph.nodes)
+    use = vocabulary().room_type(graph.room.type).use
+    made = millwork_of(seed, graph.room.style, private=slept or use == "wet")
+    return replace(made, dado="") if use else made
 
 
 def wall_name(edge: int) -> str:

@@ -14,7 +14,6 @@ from echousd.draw.sight import ASPECT, Furniture
 from echousd.draw.views import inside_view, shifted, stage_views
 from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.layers.cameras import main_piece, room_points, write_cameras
-from echousd.layers.structure import millwork
 from echousd.options import RoomOptions
 from echousd.shapes import walls
 from echousd.stage.pen import Pen
@@ -50,7 +49,7 @@ def test_a_bay_is_within_the_hint_and_the_picture_from_above(tmp_path):
     )
     graph = SceneGraph(spec, (Node("desk", "desk"),))
     rooms = (echousd.generate(graph, seed=seed, shapes="boxes", walls=True, dress="none") for seed in range(9))
-    room = next(one for one in rooms if millwork(one).bay)
+    room = next(one for one in rooms if walls.millwork(one.graph, one.provenance.seed).bay)
     stage = Usd.Stage.Open(str(room.save(tmp_path / "study", preview=False)))
     cache = UsdGeom.BBoxCache(0, [UsdGeom.Tokens.default_])
     box = cache.ComputeWorldBound(stage.GetDefaultPrim()).ComputeAlignedRange()

@@ -14,11 +14,12 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, RoomSpec, SceneGraph
-from echousd.layers.structure import COVERS, FLOORS, covered_walls, floor_slot, millwork, shell_prims
+from echousd.layers.structure import COVERS, FLOORS, covered_walls, floor_slot, shell_prims
 from echousd.options import RoomOptions
 from echousd.room import Provenance
 from echousd.shapes.finishes.slots import HARMONIES, SLOTS, metres_of
 from echousd.shapes.looks import palette_of_room
+from echousd.shapes.walls import millwork
 
 
 @pytest.fixture(scope="module")
@@ -134,7 +135,7 @@ def test_patterns_of_floors_and_walls_have_their_own_sizes(room):
     [("bedroom", "double_bed", True), ("bathroom", "toilet", True), ("living_room", "sofa", False)],
 )
 def test_nobody_looks_through_the_door_of_a_bedroom_or_bathroom(room, kind, word, private):
-    doors = {millwork(seeded(wet(room, kind, word), seed)).door for seed in range(30)}
+    doors = {millwork(wet(room, kind, word).graph, seed).door for seed in range(30)}
     assert ("glazed" not in doors) == private
     assert len(doors) > 2
 
@@ -143,7 +144,7 @@ def test_nobody_looks_through_the_door_of_a_bedroom_or_bathroom(room, kind, word
     ("kind", "word", "bare"), [("bathroom", "toilet", True), ("balcony", "armchair", True), ("study", "sofa", False)]
 )
 def test_only_walls_of_dry_rooms_have_dados(room, kind, word, bare):
-    dados = {millwork(seeded(wet(room, kind, word), seed)).dado for seed in range(30)}
+    dados = {millwork(wet(room, kind, word).graph, seed).dado for seed in range(30)}
     assert dados == ({""} if bare else {"", "boarding", "paint"})
 
 

@@ -18,6 +18,7 @@ from echousd.make.verdicts import relation_verdicts
 from echousd.place.living import living_faults
 from echousd.shapes.geometry import Collider, Geometry, Origin, Part
 from echousd.shapes.hulls import depth, forbidden, forbidden_moves
+from echousd.shapes.walls import walls_of_room
 
 FLOOR = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)])
 
@@ -60,7 +61,7 @@ def room(*things, relations=(), **spec):
 def test_a_chair_is_tucked_as_far_as_it_fits_its_back_a_millimetre_before_the_table(start):
     chair = ("chair", "dining_chair", chair_piece(), (0.2, 0.0, start), np.pi, False)
     graph, boxes, geometry = room(("table", "dining_table", table_piece(), (0, 0, 0), 0.0, True), chair)
-    found, _ = cleared(graph, boxes, geometry, FLOOR, walls=False)
+    found, _ = cleared(graph, boxes, geometry, FLOOR, ())
     x, y, z = found.position[1].tolist()
     back = z + 0.2 - 0.025  # turned to the table, the back is on the far side
     assert back >= 0.45
@@ -79,7 +80,7 @@ def test_a_table_goes_with_its_other_chairs_where_one_would_be_pushed_to_the_wal
         ("lamp", "pendant_lamp", piece(board((0.3, 0.4, 0.3), (0, 0, 0))), (0, 1.8, 1.35), 0.0, False),
     )
     graph, boxes, geometry = room(*things)
-    found, left = cleared(graph, boxes, geometry, FLOOR, walls=False)
+    found, left = cleared(graph, boxes, geometry, FLOOR, ())
     assert left == ()
     way = np.asarray(found.position) - np.asarray(boxes.position)
     assert [bool(step.any()) for step in way] == [True, False, True, True]
@@ -87,7 +88,7 @@ def test_a_table_goes_with_its_other_chairs_where_one_would_be_pushed_to_the_wal
     assert not living_faults(graph, found, FLOOR)
     alone = (*things[0][:-1], True)
     graph, boxes, geometry = room(alone, *things[1:])
-    pushed = living_faults(graph, cleared(graph, boxes, geometry, FLOOR, walls=False)[0], FLOOR)
+    pushed = living_faults(graph, cleared(graph, boxes, geometry, FLOOR, ())[0], FLOOR)
     assert ("back", "chair_pulls_out") in {(fault.object, fault.rule) for fault in pushed}
 
 
@@ -96,12 +97,12 @@ def test_what_is_locked_stays_and_what_cannot_go_is_named():
     graph, boxes, geometry = room(
         ("first", "cabinet", box, (0, 0, 0), 0.0, True), ("second", "cabinet", box, (0.9, 0, 0), 0.0, True)
     )
-    found, left = cleared(graph, boxes, geometry, FLOOR, walls=False)
+    found, left = cleared(graph, boxes, geometry, FLOOR, ())
     assert found is boxes
     (hit,) = left
     assert (hit.first, hit.second, round(hit.depth, 3)) == ("first", "second", 0.1)
     free = graph.replaced(nodes=tuple(node.replaced(locked=node.name == "first") for node in graph.nodes))
-    found, left = cleared(free, boxes, geometry, FLOOR, walls=False)
+    found, left = cleared(free, boxes, geometry, FLOOR, ())
     assert left == ()
     assert found.position[0].tolist() == boxes.position[0].tolist()
     assert found.position[1].tolist() == pytest.approx([1.001, 0, 0], abs=1e-4)
@@ -115,7 +116,7 @@ def test_what_stands_on_a_piece_goes_with_it():
         ("lamp", "table_lamp", lamp, (1.0, 0.5, -0.5), 0.0, False),
         relations=[Relation("lamp", "standing_on", "nightstand")],
     )
-    found, left = cleared(graph, boxes, geometry, FLOOR, walls=False)
+    found, left = cleared(graph, boxes, geometry, FLOOR, ())
     assert left == ()
     assert found.position[2, 0] == found.position[1, 0]
     assert found.position[2, 0] == pytest.approx(1.051, abs=1e-3)
@@ -128,7 +129,7 @@ def test_a_lamp_stands_where_its_desk_is_as_high_as_its_box():
     for z, there in ((0.15, -0.198), (-0.22, -0.22)):
         lamps = ("lamp", "table_lamp", lamp, (0.3, 1.2, z), 0.0, False)
         graph, boxes, geometry = room(("desk", "desk", desk, (0, 0, 0), 0.0, False), lamps, relations=told)
-        found, _ = cleared(graph, boxes, geometry, FLOOR, walls=False)
+        found, _ = cleared(graph, boxes, geometry, FLOOR, ())
         assert found.position[1].tolist() == pytest.approx([0.3, 1.2, there], abs=2e-3)
         assert verdicts_of(graph, found) == ["kept"]
 
@@ -145,12 +146,12 @@ def test_what_is_close_by_goes_along_and_no_told_relation_is_broken():
     # their corners are 0.43 m apart, 0.45 m are allowed: where the bed goes, the nightstand must follow
     graph, boxes, geometry = room(*things, stand, relations=close)
     assert verdicts_of(graph, boxes) == ["kept"]
-    found, left = cleared(graph, boxes, geometry, FLOOR, walls=False)
+    found, left = cleared(graph, boxes, geometry, FLOOR, ())
     assert left == ()
     assert verdicts_of(graph, found) == ["kept"]
     # locked where it is, nobody may go: the two stay, and are named
     fixed = graph.replaced(nodes=tuple(node.replaced(locked=node.name != "bed") for node in graph.nodes))
-    found, left = cleared(fixed, boxes, geometry, FLOOR, walls=False)
+    found, left = cleared(fixed, boxes, geometry, FLOOR, ())
     assert verdicts_of(fixed, found) == ["kept"]
     assert {left[0].first, left[0].second} == {"wardrobe", "bed"}
 
@@ -162,7 +163,7 @@ def test_what_stands_in_a_corner_still_does_when_it_is_moved_apart():
         ("bookshelf", "bookshelf", shelf, (-1.2, 0, -1.8), 0.0, False),
     )
     graph = stating(graph, "fern in corner")
-    found, left = cleared(graph, boxes, geometry, FLOOR, walls=False)
+    found, left = cleared(graph, boxes, geometry, FLOOR, ())
     assert left == ()
     assert verdicts_of(graph, found) == ["kept"]
 
@@ -179,7 +180,7 @@ def test_high_furniture_keeps_clear_of_a_window_sill(walls):
     graph, boxes, geometry = room(
         ("wardrobe", "wardrobe", tall, (float(wall[0]) + 1.7, 0, -1.79), 0.0, False), openings=(window,)
     )
-    found, _ = cleared(graph, boxes, geometry, FLOOR, walls=walls)
+    found, _ = cleared(graph, boxes, geometry, FLOOR, walls_of_room(graph, FLOOR, 2.8, 0) if walls else ())
     assert (found is not boxes) is walls
     if walls:
         assert found.position[0, 2] - 0.2 >= -2.0 + 0.04
@@ -196,11 +197,11 @@ def test_what_is_boxed_in_takes_along_who_stands_in_its_way():
         ("left", "sideboard", side, (-1.36, 0, -0.98), 0.0, False),
         ("right", "sideboard", side, (1.36, 0, -0.98), 0.0, False), openings=(window,),
     )  # fmt: skip
-    found, left = cleared(graph, boxes, geometry, FLOOR, walls=True)
+    found, left = cleared(graph, boxes, geometry, FLOOR, walls_of_room(graph, FLOOR, 2.8, 0))
     assert left == ()
     assert (np.asarray(found.position) != np.asarray(boxes.position)).any(1)[:2].all()  # bed and bench
     held = graph.replaced(nodes=tuple(node.replaced(locked=True) for node in graph.nodes))
-    _, stuck = cleared(held, boxes, geometry, FLOOR, walls=True)
+    _, stuck = cleared(held, boxes, geometry, FLOOR, walls_of_room(graph, FLOOR, 2.8, 0))
     assert (stuck[0].first, stuck[0].second) == ("bed", "Wall_1")
 
 

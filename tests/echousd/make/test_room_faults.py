@@ -12,6 +12,7 @@ from echomodel.boxes import Boxes
 from echomodel.openings import Opening
 from echousd.checks import check
 from echousd.exporting.formats import export
+from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.make import save
 from echousd.make.verdicts import RoomWarning
 
@@ -61,6 +62,25 @@ def test_a_room_an_edit_and_a_check_tell_one_depth(tmp_path, place):
     (told,), (hit,) = after.outcomes[0].collisions, check(after.save(root.parent, preview=False)).collisions
     assert (told.first, told.second) == (hit.first, hit.second) == (found[0].first, found[0].second)
     assert round(told.depth, 3) == round(hit.depth, 3)
+
+
+@pytest.mark.parametrize(("seed", "style"), [(7, None), (3, "country")])
+@pytest.mark.parametrize("place", [True, False])
+def test_what_stands_in_a_wall_is_told_by_one_depth(tmp_path, place, seed, style):
+    ward = Node("wardrobe", "wardrobe", size=(1.5, 2.0, 0.6), position=(1.96, 0.0, 0.0), yaw=-1.5708)
+    graph = SceneGraph(RoomSpec("bedroom", size=(4.0, 3.6), style=style), (ward, Node("bed", "double_bed")), ())
+    told = {"shapes": "parts", "dress": "none", "place": place}
+    with pytest.warns(RoomWarning, match="wardrobe and Wall_. collide"):
+        room = echousd.generate(graph, seed=seed, drafts=1, **told)
+    root = room.save(tmp_path / "room", preview=False)
+    assert depths(room.outcomes[0].collisions) == depths(check(root).collisions) != {}
+    with pytest.warns(RoomWarning, match="wardrobe and Wall_. collide"):
+        after = echousd.edit(root, move=["wardrobe:1.8,0"], place=place)
+    assert depths(after.outcomes[0].collisions) == depths(check(after.save(root.parent, preview=False)).collisions)
+
+
+def depths(hits):
+    return {(hit.first, hit.second): round(hit.depth, 3) for hit in hits}
 
 
 def test_a_good_room_warns_of_nothing():

@@ -9,8 +9,9 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.vocabulary import vocabulary
 from echousd.draw.scenery import read_scenery, with_ceiling
-from echousd.layers.structure import covered_walls, millwork, shell_prims
+from echousd.layers.structure import covered_walls, shell_prims
 from echousd.shapes.looks import palette_of_room
+from echousd.shapes.walls import millwork
 
 DECO = vocabulary().style("Art Deco")
 
@@ -47,8 +48,9 @@ def test_a_style_told_of_the_room_reshapes_its_furniture_in_place(room, tmp_path
 def test_all_of_a_room_keeps_to_its_style(room):
     spec = room.graph.room.replaced(style="art_deco")
     told = echousd.generate(room.graph.replaced(room=spec), seed=3, drafts=1, dress="none")
-    assert millwork(told).cornice == 0.09
-    assert {millwork(told).window} <= set(DECO.windows)
+    made = millwork(told.graph, 3)
+    assert made.cornice == 0.09
+    assert {made.window} <= set(DECO.windows)
     assert set(covered_walls(told).values()) <= set(DECO.covers)
     assert not any(one.label == "beam" for one in shell_prims(told))
     assert {palette_of_room(seed, "art_deco") for seed in range(30)} == set(DECO.palettes)
@@ -62,7 +64,7 @@ def test_beams_lie_below_ceilings_of_country_rooms_and_are_drawn_below_them_alon
     found = [[one for one in shell_prims(room) if one.label == "beam"] for room in made]
     assert {len(one) for one in found} == {0, 1}
     room, (beams,) = next((room, one) for room, one in zip(made, found, strict=True) if one)
-    assert millwork(room).cornice == 0
+    assert millwork(room.graph, room.provenance.seed).cornice == 0
     down = Boxes(room.boxes.size, room.boxes.position - np.array((0, 0.3, 0), np.float32), room.boxes.yaw)
     low = replace(room, graph=room.graph.with_room(height=2.4), layouts=(down,))
     assert not any(one.label == "beam" for one in shell_prims(low))
