@@ -111,8 +111,10 @@ BEFORE, THICK = np.float32(2e-3), np.float32(0.016)
 # cosine by which that is less aside; how bright bars of the window are before the light.
 BEHIND, SEEN_BY, CLOSER, BAR = 0.05, 0.42, 6, 0.45
 MIRROR = 0.8  # gloss of what mirrors like glass with silver behind it
-# Of glass that one looks through; how white what it mirrors is, and its share straight on: aslant it is more.
-SHEETS, WHITE, CLEAR = 12, 0.8, 0.08
+# Of glass that one looks through: sheets at most, its colour, how bright is what it mirrors from aside and more of what
+# is above, the share of that straight on, aslant it is more; by which shares differ where an edge of it is.
+SHEETS, TINT, MIRRORED, CLEAR = 12, np.array([[0.84], [0.94], [0.92]], np.float32), (0.32, 0.58), 0.04
+EDGE = 0.12
 
 
 def _met(world: World, pixel: np.ndarray, place: np.ndarray, first: Seen | None = None) -> tuple[np.ndarray, Seen]:
@@ -128,9 +130,10 @@ def _met(world: World, pixel: np.ndarray, place: np.ndarray, first: Seen | None 
         origin, way = camera_rays(world, across + right, down + below)
         hit: Sequence[np.ndarray] = first_hit(world, origin, way)
         if first is not None:
-            new = np.flatnonzero(hit[0] != first.face.take(rows))
+            before = first.of(rows)
+            new = np.flatnonzero((hit[0] != before.face) | ((before.shown > 0) & (before.face >= 0)))
             origin, way, rows, *hit = (each.take(new, -1) for each in (origin, way, rows, *hit))
-        part = _seen(world, origin, way, hit)
+        part, veil = _seen(world, origin, way, hit), np.zeros((4, len(rows)), np.float32)
         for glass in (True,) * SHEETS + (False,):  # through it one sees what is behind, in a mirror what is before
             looks = world.scenery.thin.take(part.face) == 1 if glass else world.scenery.gloss.take(part.face) > MIRROR
             some = np.flatnonzero(looks & (part.face >= 0))
@@ -142,8 +145,14 @@ def _met(world: World, pixel: np.ndarray, place: np.ndarray, first: Seen | None 
             for own, other in zip(part, _seen(world, origin, on, first_hit(world, origin, on)), strict=True):
                 own[..., some] = other
             if glass:
-                bare, share = part.shown.take(some) == 0, CLEAR + (1 - CLEAR) * (1 + along(on, normal)) ** 3
-                part.shown[some[bare]], part.glow[:, some[bare]] = share[bare], WHITE
+                facing = along(on, normal)
+                above = np.clip(on[1] - 2 * facing * normal[1], 0, 1)
+                color = np.insert(TINT * (MIRRORED[0] + MIRRORED[1] * above), 3, 1, axis=0)
+                veil[:, some] += (1 - veil[3, some]) * (CLEAR + (1 - CLEAR) * (1 + facing) ** 3) * color
+        some = np.flatnonzero(veil[3])
+        veil, behind = veil[:, some], (1 - veil[3, some]) * part.shown[some]
+        part.shown[some] = veil[3] + behind
+        part.glow[:, some] = (veil[:3] + behind * part.glow[:, some]) / part.shown[some]
         if first is not None:
             differs = np.flatnonzero(_other(world, part, first.of(rows)))
             part, rows = part.of(differs), rows.take(differs)
@@ -156,7 +165,7 @@ def _other(world: World, one: Seen, two: Seen) -> np.ndarray:
     """(n,) bool: what is another surface or material."""
     material = world.scenery.planes.material
     same = same_surface(one.normal, one.point, two.normal, two.point)
-    return (material.take(one.face) != material.take(two.face)) | ~same
+    return (material.take(one.face) != material.take(two.face)) | ~same | (np.abs(one.shown - two.shown) > EDGE)
 
 
 def _at_edges(world: World, seen: Seen, shape: tuple[int, int]) -> np.ndarray:

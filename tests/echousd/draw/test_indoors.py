@@ -15,10 +15,11 @@ import echousd
 from echousd.draw import tracing
 from echousd.draw.drawables import image_of
 from echousd.draw.from_files import render
-from echousd.draw.indoors import BRIGHT, LUMA, SHARE, evened, exposure, read_lights
+from echousd.draw.indoors import BRIGHT, LUMA, SHARE, Bounced, evened, exposure, read_lights
+from echousd.draw.rays import World, embree
 from echousd.draw.rendering import render_stage
 from echousd.draw.scenery import CLOTH, SHEER, read_scenery, with_ceiling
-from echousd.draw.tracing import trace
+from echousd.draw.tracing import _at_edges, _met, trace
 from echousd.draw.views import View, hero_view, view_matrix
 from echousd.options import RoomOptions
 from echousd.stage.showing import showing_variant
@@ -460,6 +461,25 @@ def test_through_glass_one_sees_what_lies_behind_and_aslant_its_surface(eye, thi
     view = replace(down, matrix=view_matrix(np.array(eye), np.array([0.0, 0.06, 0.0])), half=0.05)
     seen = trace(scenery, view, 16, rays=2).mean((0, 1))
     assert (seen[0] > 2 * seen[1]) == red
+
+
+def test_a_pane_has_a_tint_and_rays_go_on_both_sides_of_its_edge():
+    """It had an edge only where what lies behind changed with it: glasses were drawn jagged."""
+    scenery, down = box_room(sky=1.0, **LAMP)
+    for level in np.linspace(1.0, 1.05, 6):
+        scenery = with_sheet(scenery, level_sheet(0.8, 0.8, level), thin=np.ones(2))
+    dark = Bounced.dark(*scenery.bounds)
+    world = World(embree(scenery.triangles), scenery, down, 64, np.zeros(4), dark, np.zeros(3, np.float32), True)
+    _, seen = _met(world, np.arange(64 * 64), np.full((2, 1), 0.5))
+    pane = seen.shown > 0
+    red, green, _ = seen.glow[:, pane].mean(1)
+    assert green > 1.05 * red > 0
+    edges = _at_edges(world, seen, (64, 64))
+    rim = np.flatnonzero(edges & (np.abs(np.gradient(pane.reshape(64, 64).astype(float))).sum(0) > 0).ravel())
+    assert len(rim) > 40
+    pixel, more = _met(world, rim, np.random.default_rng(0).random((2, len(rim))), seen)
+    assert ((more.shown > 0) > pane[pixel]).any()
+    assert ((more.shown > 0) < pane[pixel]).any()
 
 
 def test_a_glossy_floor_mirrors_the_window_and_more_so_aslant():
