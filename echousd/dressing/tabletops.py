@@ -132,6 +132,7 @@ def _between(corners: np.ndarray, low: float, high: float) -> np.ndarray:
     return np.array([*lines, *(shapely.polygons(plan[~flat]) if (~flat).any() else [])], object)
 
 
+ASKEW = 4  # times as far as others
 LAID = 0.6  # share of rooms whose dining table is set
 EYE = 1.7  # metres: what is put higher cannot be seen
 CASES = ("cabinet", "shelf")  # looks of what books and baskets stand in and on: no cistern, no fridge
@@ -174,7 +175,8 @@ def decked(setting: Setting, host: Standing, surface: Surface, wishes: Sequence[
             continue
         for kind in [k for k in order if k not in taken] or order:
             straight = kind in TABLE["straight"] or surface.area.area < 0.1
-            thing = surface.put(setting, kind, wish.at, turn=0.0 if straight else turn, word=str(number))
+            lies = turn * (ASKEW if kind in TABLE["loose"] else 1 - straight)
+            thing = surface.put(setting, kind, wish.at, turn=lies, word=str(number))
             if thing:
                 taken.add(kind)
                 for place, other in enumerate(wish.beside):
