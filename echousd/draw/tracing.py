@@ -7,7 +7,7 @@ import numpy as np
 from PIL import Image, ImageFilter
 
 from echomodel.late import lates
-from echomodel.triangles import along, unit
+from echomodel.triangles import along, area_normals, cross, unit
 from echousd.draw.indoors import DIM, GLOWING, LUMA, OWN, RIM, SUN, Bounced, evened, exposure, rolled
 from echousd.draw.rays import BLOCK, Seen, World, camera_rays, embree, even, first_hit, free, on_sphere, shifts, way_to
 from echousd.draw.scenery import CLOTH, SKY_LIGHT, Scenery, next_room, outside
@@ -193,8 +193,7 @@ def _seen(world: World, origin: np.ndarray, way: np.ndarray, hit: Sequence[np.nd
     lean = scenery.planes.normal.take(face, 1)
     normal = unit(lean[:3] + u * lean[3:6] + v * lean[6:])
     averted = np.flatnonzero(along(normal, way) > 0)  # seen from behind, or at a rim whose round normals look away
-    a, b, c = (scenery.triangles[face[averted], corner].T for corner in range(3))
-    flat = np.cross(b - a, c - a, axis=0)
+    flat = area_normals(scenery.triangles[face[averted]]).T
     normal[:, averted] *= -np.copysign(np.float32(1), along(flat, normal[:, averted]) * along(flat, way[:, averted]))
     seen = Seen(face, origin + far * way, normal, hit[2], glow, shown)
     if world.view.inside:
@@ -419,7 +418,7 @@ def _direct(
         which = np.minimum((turn[0] * many).astype(int), many - 1)
         plane, (u, v) = flat.take(which, 1), spot if flat is panes else (turn[0] * many - which, turn[1])
         way, away = way_to(point, plane[:3] + (2 * u - 1) * plane[3:6] + (2 * v - 1) * plane[6:9])
-        outwards = along(way, np.cross(plane[3:6], plane[6:9], axis=0))  # for a quarter of its area
+        outwards = along(way, cross(plane[3:6].T, plane[6:9].T).T)  # for a quarter of its area
         outwards = np.abs(outwards) if flat is panes else np.maximum(outwards, 0)
         seen = np.clip(along(way, normal), 0, None) * 4 * outwards / np.maximum(away, 0.2) ** 2
         share = free(world.tree, point, way, away, seen > 1e-4) * np.minimum(seen, 1.5)  # none a spark near a pane

@@ -8,7 +8,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 import shapely
 
-from echomodel.boxes2d import footprints, seen, turned
+from echomodel.boxes2d import outline, seen, turned
 from echomodel.dressing import KINDS
 from echomodel.dressing import thing as solids_of
 from echomodel.openings import STEP, Opening, free_area, zone
@@ -206,8 +206,7 @@ def standing(
 
 def rectangle(centre: np.ndarray, size: np.ndarray, yaw: float) -> shapely.Polygon:
     """A rectangle in plan (x, z), `size` along its own x and z, turned by `yaw` about +Y."""
-    (wide, deep), (x, z) = size, centre
-    return shapely.Polygon(footprints(np.array([[wide, 0.0, deep]]), np.array([[x, 0.0, z]]), np.array([yaw]))[0])
+    return shapely.polygons(outline(size / 2, np.asarray(yaw)) + centre)
 
 
 def meets(thing: Standing, low: float, high: float, plan: shapely.Geometry) -> bool:

@@ -9,7 +9,7 @@ import shutil
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from echomodel.files import check_free, check_ours, digest, telling
@@ -88,8 +88,8 @@ def _stage(
     for path in (*order, *remove):
         if inside(folder, path, "a file of the room").is_dir():
             raise ValueError(f"{folder / path}: is a folder, where a file of the room belongs; nothing was changed")
-    above = {place for path in order for place in (folder / path).parents} - {*folder.parents}
-    for blocking in (place for place in sorted(above) if place.is_file()):
+    above = sorted({place for path in order for place in PurePosixPath(path).parents})
+    for blocking in (folder / place for place in above if (folder / place).is_file()):
         raise ValueError(f"{blocking}: is a file, where a folder of the room belongs; nothing was changed")
     try:
         _discard(staging)

@@ -47,11 +47,10 @@ class Pen:
         """Define a prim of a type, and those above it; opinions as for `over`."""
         spec = self.over(path, values, apis, **about)
         spec.typeName = type_name
-        for above in reversed(Sdf.Path(path).GetPrefixes()):
+        above, found = Sdf.Path(path), spec
+        while found.specifier == Sdf.SpecifierOver and above.IsPrimPath():
+            found.specifier, above = Sdf.SpecifierDef, above.GetParentPath()
             found = self.layer.GetPrimAtPath(self._at(above))
-            if found.specifier != Sdf.SpecifierOver:
-                break
-            found.specifier = Sdf.SpecifierDef
         return spec
 
     def _at(self, path: str | Sdf.Path) -> str | Sdf.Path:
@@ -88,15 +87,16 @@ def say(spec: Sdf.PrimSpec, values: Mapping[str, Any], apis: Iterable[str] = (),
     to. `about`: metadata by name.
     """
     for words, value in values.items():
-        name, kind, variability, custom, connects = _parsed(words)
+        name, kind, held, variability, custom, connects = _parsed(words)
         if kind is None:
             relate(spec, name, *([value] if isinstance(value, str | Sdf.Path) else value), custom=custom)
             continue
         attribute = spec.properties.get(name) or Sdf.AttributeSpec(spec, name, kind, variability, custom)
         if connects:
             attribute.connectionPathList.explicitItems = [Sdf.Path(value)]
-        elif value is not None:  # USD takes four times as long to find out how an array of numpy fits
-            attribute.default = kind.type.pythonClass.FromNumpy(value) if isinstance(value, np.ndarray) else value
+        elif value is not None:  # USD takes four times as long to find out how an array of numpy or a tuple fits
+            of = held.FromNumpy(value) if isinstance(value, np.ndarray) else value
+            attribute.default = held(*value) if isinstance(value, tuple) and not kind.isArray else of
     if apis:
         apply_apis(spec, *apis)
     for name, value in about.items():
@@ -105,13 +105,15 @@ def say(spec: Sdf.PrimSpec, values: Mapping[str, Any], apis: Iterable[str] = (),
 
 
 @cache
-def _parsed(words: str) -> tuple[str, Sdf.ValueTypeName | None, Sdf.Variability, bool, bool]:
-    """Name, type (None = a relationship) and variability of a property, whether it is custom, and a connection."""
+def _parsed(words: str) -> tuple[str, Sdf.ValueTypeName | None, Any, Sdf.Variability, bool, bool]:
+    """Name, type (None = a relationship), class of the value and variability of a property, whether it is custom, and a
+    connection."""
     *before, name = words.split()
     name = name.removesuffix(".connect")
     kind = None if before[-1] == "rel" else Sdf.ValueTypeNames.Find(before[-1])
     variability = UNIFORM if "uniform" in before else Sdf.VariabilityVarying
-    return name, kind, variability, "custom" in before, words.endswith(".connect")
+    held = kind and kind.type.pythonClass
+    return name, kind, held, variability, "custom" in before, words.endswith(".connect")
 
 
 def ops(**steps: tuple[str, Any]) -> dict[str, Any]:
