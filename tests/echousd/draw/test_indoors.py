@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from box_room import LAMP, box_room, level_sheet, with_sheet
 from PIL import Image
 from pxr import Gf, Usd, UsdGeom, UsdLux
 from small_room import BARE, StandIn, small_graph
@@ -127,24 +128,6 @@ def test_a_room_without_a_ceiling_is_lit_as_it_were_told_with_one(tmp_path):
         np.testing.assert_allclose(*found, rtol=0.02)
 
 
-def box_room(**lights) -> tuple:
-    """The camera on a floor of a closed box without furniture, and the scenery, lit as told."""
-    import trimesh
-
-    stage = Usd.Stage.CreateInMemory()
-    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
-    UsdGeom.SetStageUpAxis(stage, "Y")
-    box = trimesh.creation.box((4, 3, 4))
-    box.invert()
-    mesh = UsdGeom.Mesh.Define(stage, "/Box")
-    mesh.CreatePointsAttr((box.vertices + np.array([0, 1.5, 0])).astype(np.float32))
-    mesh.CreateFaceVertexCountsAttr([3] * 12)
-    mesh.CreateFaceVertexIndicesAttr(box.faces.ravel().tolist())
-    scenery = read_scenery(stage)
-    down = View(view_matrix(np.array([0.0, 2.5, 0.0]), np.array([0.01, 0.0, 0.0])), 0.7, False, inside=True)
-    return replace(scenery, lights=replace(scenery.lights, **lights)), down
-
-
 def test_a_lamp_lights_what_is_near_it_and_a_window_what_is_before_it():
     lamp = {"bulbs": np.array([[(1.0, 0.5, 0.0)]], np.float32), "power": np.array([(3.0, 3.0, 3.0)], np.float32)}
     scenery, down = box_room(sky=0.0, **lamp)
@@ -220,28 +203,6 @@ def test_a_lamp_shines_from_its_shade_and_throws_no_shadow_of_its_own_on_the_cei
     picture = trace(replace(scenery, **joined), up, 96, rays=2).mean(-1)
     beside, middle = picture[44:52, 76:80].mean(), picture[44:52, 63:66].mean()
     assert middle > 0.9 * beside
-
-
-def with_sheet(scenery, corners: np.ndarray, **values):
-    """The scenery and an upright or level rectangle (4, 3) in it, whose colours, glow or texture are told."""
-    triangles = corners.astype(np.float32)[[[0, 1, 2], [0, 2, 3]]]
-    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
-    added = {
-        "triangles": triangles, "normals": np.broadcast_to(normal / np.linalg.norm(normal), (2, 3, 3)),
-        "flat_colors": np.full((2, 3), 0.5), "emissive": np.zeros((2, 3)), "gloss": np.zeros(2), "thin": np.zeros(2),
-        "st": np.array([(0, 0), (1, 0), (1, 1), (0, 1)], float)[[[0, 1, 2], [0, 2, 3]]], "texture": np.full((2, 2), -1),
-        "wall": np.full(2, -1), **values,
-    }  # fmt: skip
-    joined = {key: np.concatenate([getattr(scenery, key), more]) for key, more in added.items()}
-    return replace(scenery, **{key: value.astype(getattr(scenery, key).dtype) for key, value in joined.items()})
-
-
-def level_sheet(x: float, z: float, y: float = 0.05) -> np.ndarray:
-    """(4, 3) corners of a rectangle of these sides about the middle of the room, facing up."""
-    return np.array([(-x, y, z), (x, y, z), (x, y, -z), (-x, y, -z)]) / (2, 1, 2)
-
-
-LAMP = {"bulbs": np.array([[(0.0, 1.5, 0.0)]], np.float32), "power": np.ones((1, 3), np.float32)}
 
 
 def test_a_fine_pattern_is_an_even_tone_from_afar_and_seen_from_near(tmp_path):
