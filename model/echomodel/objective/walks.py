@@ -1,5 +1,5 @@
-"""Terms of ways through one room, which have no gradient: a robot of 0.2 m radius walks from the door to every piece
-(as SceneEval and PhyScene ask of rooms), a person walks in."""
+"""Terms of ways through one room, which have no gradient: a person walks in, and passes to every piece; how far a robot
+of 0.2 m radius gets is what SceneEval and PhyScene ask of rooms."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,8 +11,9 @@ from echomodel.boxes2d import footprints
 from echomodel.objective.plan import CLEAR_HEIGHT, Found, Plan, found
 from echomodel.openings import inward_normal, segment
 
-# Metres: the robot's radius, half of the width on which a person walks in, and how much narrower a way either takes.
-ROBOT, PERSON, SLACK = 0.2, 0.3, 0.025
+# Metres: the robot's radius, half of the width on which a person passes, and walks in, and how much narrower a way
+# each takes.
+ROBOT, PASSES, PERSON, SLACK = 0.2, 0.25, 0.3, 0.025
 STEP, BEFORE = 0.1, 0.35  # metres beyond that between a door and where one enters, and around it
 LEAST = 1e-4  # square metres: no smaller place to be
 ARM = 0.4  # metres between the robot and what it can take hold of
@@ -87,10 +88,10 @@ def _ways(plan: Plan, radius: float, there: Array) -> Ways:
     return Ways(plan, radius, boxes, high, parts[order], area[order], doors)
 
 
-def walk(plan: Plan) -> Ways | None:
+def walk(plan: Plan, radius: float = ROBOT) -> Ways | None:
     """Where a robot gets to from the door or passage that leads to most of a room, or in its largest free part where
-    there are none; chairs are pulled aside. None where its floor is unknown."""
-    return _ways(plan, ROBOT, ~(plan.movable & plan.stands("at"))) if plan.rooms else None
+    there are none; chairs are pulled aside. None where its floor is unknown. `radius`: metres."""
+    return _ways(plan, radius, ~(plan.movable & plan.stands("at"))) if plan.rooms else None
 
 
 @once
@@ -100,10 +101,10 @@ def entered(plan: Plan) -> Ways | None:
 
 
 def reached(plan: Plan) -> Found:
-    """What is used can be walked to from the door, and so can most of the floor and the other doors."""
+    """A way leads from the door to what is used, to most of the floor and to the other doors."""
     if (ways := entered(plan)) and (ways.share < OPEN or any(part for part, _ in ways.doors) or ways.lost):
-        ways = walk(plan)  # else who is less wide gets there, too
-    rows = [(k, -1.0, 0.0, 0) for k in ways.lost] if ways else []
+        ways = walk(plan, PASSES)  # else who is less wide gets there, too
+    rows = [(k, -1.0, 2 * PASSES, 0) for k in ways.lost] if ways else []
     if ways and ways.share < (least := 1.0 if (parted := any(part > 0 for part, _ in ways.doors)) else OPEN):
         rows.append((ways.between(*ways.parts[:2]), ways.share - least, 100 * (1 - ways.share), 1 + parted))
     return _rows(rows)

@@ -504,7 +504,9 @@ def test_what_closes_much_of_the_floor_off_is_seen():
     room = Room({"bar": bar, "plant": {"kind": "plant", "size": (0.7, 1.2, 0.7), "at": (2.0, 0.0)}})
     door = Opening("door", "door", 0, 2.0, 0.9, 2.0)
     assert "plant closes the way to 50 % of the free floor" in room.found(openings=(door,))["plant", "reached"]
-    assert ("plant", "reached") not in room.moved("plant", size=(0.3, 1.2, 0.3)).found(openings=(door,))
+    for size, closed in ((0.12, True), (0.08, False)):  # ways of 0.44 and 0.46 m beside it
+        found = room.moved("plant", size=(size, 1.2, size)).found(openings=(door,))
+        assert (("plant", "reached") in found) == closed
 
 
 @pytest.mark.parametrize(("wide", "closed"), [(4.9, True), (4.0, False)])
