@@ -96,7 +96,7 @@ def test_a_sofa_in_the_room_slides_back_and_forth_too_one_at_its_wall_along_it(o
 
 
 def test_what_is_missed_by_a_hair_is_moved_by_as_much() -> None:
-    floor = np.array([(-1.2, -1.5), (1.2, -1.5), (1.2, 1.5), (-1.2, 1.5)])
+    floor = np.array([(-1.2, -1.5), (1.3, -1.5), (1.3, 1.5), (-1.2, 1.5)])  # 0.5 m at the bed's foot
     bed, shelf = (1.0, 0.9, 2.0), (0.7475, 1.8, 2.0)  # 0.505 m beside the bed: 0.3 m at one side, 0.2 at the other
     position = [(-0.2, 0.0, -0.0375), (-0.2, 0.0, -1.12625), (-0.2, 0.0, 1.12625)]
     words = ["single_bed", "bookshelf", "bookshelf"]
