@@ -161,9 +161,8 @@ def _write_levels(pen: Pen, name: str, geometry: Geometry, slot: str) -> None:
     for part in geometry.parts:
         pen.over(piece_path(f"/{name}", name, part.name, part.body), {"token visibility": "invisible"})
     for collider in geometry.colliders:
-        guide = piece_path(f"/{name}", name, collider.name, collider.body)
-        pen.over(guide, {"uniform token purpose": "default"})
-        pen.bind(guide, f"/{name}/{MTL}/{slot}")
+        pen.over(piece_path(f"/{name}", name, collider.name, collider.body), {"uniform token purpose": "default"})
+    pen.bind(f"/{name}/{GEO}", f"/{name}/{MTL}/{slot}")
 
 
 def most_used(geometry: Geometry) -> list[str]:

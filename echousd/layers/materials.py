@@ -33,7 +33,7 @@ def look_images(look: Look, harmony: str) -> dict[str, tuple[str, bytes]]:
 
 
 def define_material(pen: Pen, path: str, look: Look, harmony: str = "") -> None:
-    """Author a UsdPreviewSurface material; a textured one reads `primvars:st`. `tint_material` tells colour and gloss.
+    """Author a UsdPreviewSurface material; a textured one reads `primvars:st`. `tints` tell colour and gloss.
 
     `path`: where. `look`: what it looks like. `harmony`: whose colours its images have; "" = without images, for an
     asset that stands for itself.
@@ -66,19 +66,20 @@ def tint_factor(base: Look, look: Look) -> list[float]:
     return [round(b / max(a, 1e-4), 4) for a, b in zip(base.color, look.color, strict=True)]
 
 
-def tint_material(pen: Pen, path: str, base: Look, look: Look) -> None:
-    """Author, for a variant, how a material comes from its images in the colours of `base` to those of `look`, and its
+def tints(base: Look, look: Look) -> dict[tuple[str, str], Any]:
+    """Part of a material and its property -> what makes of images in the colours of `base` those of `look`, and its
     gloss.
     """
-    plain: dict[str, Any] = {} if base.pattern else {"color3f inputs:diffuseColor": look.color}
-    if base.pattern and not base.pattern.startswith("picture_"):
-        pen.over(f"{path}/{IMAGES['diffuseColor']}", {"float4 inputs:scale": (*tint_factor(base, look), 1.0)})
+    found: dict[tuple[str, str], Any] = {}
+    if not base.pattern:
+        found["surface", "color3f inputs:diffuseColor"] = look.color
+    elif not base.pattern.startswith("picture_"):
+        found[IMAGES["diffuseColor"], "float4 inputs:scale"] = (*tint_factor(base, look), 1.0)
     if not uneven(base):
-        plain["float inputs:roughness"] = look.rough
+        found["surface", "float inputs:roughness"] = look.rough
     elif look.gloss != 1:
-        pen.over(f"{path}/{IMAGES['roughness']}", {"float4 inputs:scale": (*(look.gloss,) * 3, 1.0)})
-    if plain:
-        pen.over(f"{path}/surface", plain)
+        found[IMAGES["roughness"], "float4 inputs:scale"] = (*(look.gloss,) * 3, 1.0)
+    return found
 
 
 def write_looks(
@@ -107,6 +108,11 @@ def write_palettes(
     images are in. `looks`: harmony -> material name -> look. `root`: path of the prim that gets the set. `scope`: of
     the materials.
     """
-    for harmony, inside in pen.variants(root, "palette", looks, chosen).items():
-        for name, look in sorted(looks[harmony].items()):  # bytes must not show the order of a set
-            tint_material(inside, f"{scope}/{name}", looks[chosen][name], look)
+    pens = pen.variants(root, "palette", looks, chosen)
+    for name, base in sorted(looks[chosen].items()):  # bytes must not show the order of a set
+        every = {harmony: tints(base, looks[harmony][name]) for harmony in pens}
+        for at in sorted({at for told in every.values() for at in told}):
+            alike = all(told.get(at) == every[chosen].get(at) for told in every.values())
+            for harmony, inside in {chosen: pen}.items() if alike else pens.items():  # once, beside the variants
+                if at in every[harmony]:
+                    inside.over(f"{scope}/{name}/{at[0]}", {at[1]: every[harmony][at]})
