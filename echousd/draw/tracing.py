@@ -113,8 +113,7 @@ BEHIND, SEEN_BY, CLOSER, BAR = 0.05, 0.42, 6, 0.45
 MIRROR = 0.8  # gloss of what mirrors like glass with silver behind it
 # Of glass that one looks through: sheets at most, its colour, how bright is what it mirrors from aside and more of what
 # is above, the share of that straight on, aslant it is more; by which shares differ where an edge of it is.
-SHEETS, TINT, MIRRORED, CLEAR = 12, np.array([[0.84], [0.94], [0.92]], np.float32), (0.32, 0.58), 0.04
-EDGE = 0.12
+SHEETS, TINT, MIRRORED, CLEAR, EDGE = 12, np.array([[0.84], [0.94], [0.92]], "f4"), (0.32, 0.58), 0.04, 0.12
 
 
 def _met(world: World, pixel: np.ndarray, place: np.ndarray, first: Seen | None = None) -> tuple[np.ndarray, Seen]:
@@ -145,8 +144,7 @@ def _met(world: World, pixel: np.ndarray, place: np.ndarray, first: Seen | None 
             for own, other in zip(part, _seen(world, origin, on, first_hit(world, origin, on)), strict=True):
                 own[..., some] = other
             if glass:
-                facing = along(on, normal)
-                above = np.clip(on[1] - 2 * facing * normal[1], 0, 1)
+                above = np.clip(on[1] - 2 * (facing := along(on, normal)) * normal[1], 0, 1)
                 color = np.insert(TINT * (MIRRORED[0] + MIRRORED[1] * above), 3, 1, axis=0)
                 veil[:, some] += (1 - veil[3, some]) * (CLEAR + (1 - CLEAR) * (1 + facing) ** 3) * color
         some = np.flatnonzero(veil[3])

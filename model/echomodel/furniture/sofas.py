@@ -65,8 +65,8 @@ def upholstered_arms(w: float, foot: float, y: float, d: float, arm: float, styl
         x, form = x - 0.2 * arm, {"head": 0.25 * arm, "power": 3.0, "turn": rotation(z=-0.4 * arm / (y - foot))}
     made = between(Wrapped, (x - half, foot, -z), (x + half, y, z), **form)
     low, high = (x - 0.8 * half, foot + 0.03, z - 0.014), (x + 0.8 * half, y - 0.2 * half, z + 0.014)
-    panel = between(Wrapped, low, high, **form | {"head": 0.8 * half})
-    return both(made, *[panel] * rolled, *corded(style, panel if rolled else made))
+    panel = between(Wrapped, low, high, **form | {"head": 0.8 * form["head"]})
+    return both(made, panel, *corded(style, panel))
 
 
 def lounge_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -92,6 +92,15 @@ def _foot(style: Style) -> float:
 def _legs(style: Style, w: float, d: float, foot: float) -> list[Solid]:
     kind = style.legs if style.legs not in ("trestle", "hairpin") else "straight"
     return base(style, w * 0.94, d * 0.88, foot, 0.05 * style.bulk, kind)
+
+
+def _rails(low: tuple, high: tuple, count: int) -> list[Solid]:
+    """What seats lie on: a body whose front is of so many firm panels, sewn together."""
+    (x0, y0, _), (x1, y1, z1) = low, high
+    half, turn = np.array([y1 - y0, 0.09, (x1 - x0) / count]) / 2, np.roll(np.eye(3), 1, axis=0)
+    middles = ((x0 + (2 * k + 1) * half[2], (y0 + y1) / 2, z1 - 0.045) for k in range(count))
+    panels = [Wrapped(np.array(at), turn, role="base", half=half, head=0.03, power=3.0) for at in middles]
+    return [box(low, (x1, y1, z1 - 0.045), "fabric", 0.015, "base"), *panels]
 
 
 def _cushions(
@@ -122,9 +131,11 @@ def _couch(
     pad = 0.12 + 0.06 * style.softness
     z0, z1 = -d / 2, d / 2
     parts: list[Solid] = _legs(style, w, d, foot)
+    if body.get("frame"):
+        low, foot = (-w / 2 + 0.02, foot, z0 + 0.04), foot + 0.04
+        parts.append(box(low, (w / 2 - 0.02, foot, z1 - 0.035), "wood", 0.006, "leg"))
     inset, under = (0.13 * arm, 0.006) if body.get("skirt") else (arm * 0.5, foot)
-    low, high = (-w / 2 + inset, under, z0 + 0.02), (w / 2 - inset, seat - pad, z1 - 0.03)
-    parts.append(box(low, high, "fabric", 0.015 if body.get("skirt") else 0.045, "base"))
+    parts += _rails((-w / 2 + inset, under, z0 + 0.02), (w / 2 - inset, seat - pad, z1 - 0.02), seats)
     tall = h - (0.06 if seats > 1 and style.contrast < 0.6 else 0.0)
     x = w / 2 - max(0.4 * arm, 0.012)
     low, high, across = (-z0 - frame, foot + 0.02, -x), (-z0, tall, x), rotation(y=np.pi / 2)
@@ -155,7 +166,7 @@ def _couch(
     if chaise:
         x0, x1 = (xs[0] - arm, xs[1]) if chaise < 0 else (xs[-2], xs[-1] + arm)
         reach = z0 + chaise_depth
-        parts.append(box((x0, foot, z1 - 0.1), (x1, seat - pad, reach - 0.015), "fabric", 0.015, "base"))
+        parts += _rails((x0, foot, z1 - 0.1), (x1, seat - pad, reach - 0.01), 1)
         parts.append(cushion((x0, seat - pad, z1 - 0.04), (x1, seat, reach), style))
         t = 0.05 * style.bulk
         z = reach - 0.12
@@ -207,8 +218,7 @@ def l_shaped_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
     count = int(np.clip(round(w / 0.85), 3, 5))
     parts = _couch(np.array([w, h, d]), style, choices, count, chaise=side, chaise_depth=depth)
     if choices.chance("extra", 0.35):
-        foot, seat, frame = _foot(style), 0.43, 0.14
-        y1 = h - 0.06
+        foot, seat, frame, y1 = _foot(style), 0.43, 0.14, h - 0.06
         x0, x1 = sorted((side * w / 2, side * (w / 2 - frame)))
         parts.append(box((x0, foot, -d / 2 + 0.05), (x1, y1, -d / 2 + depth - 0.05), "fabric", 0.04, "back"))
         x0, x1 = sorted((side * (w / 2 - frame), side * (w / 2 - frame - 0.15)))
@@ -223,8 +233,7 @@ def chaise_longue_sofa(size: Size, style: Style, choices: Choices) -> list[Solid
     foot = max(0.05, _foot(style))
     seat, pad = min(0.43, h * 0.55), 0.14
     parts: list[Solid] = _legs(style, w, d, foot)
-    low, high = (-w / 2 + 0.015, foot, -d / 2 + 0.03), (w / 2 - 0.015, seat - pad, d / 2 - 0.015)
-    parts.append(box(low, high, "fabric", 0.02, "base"))
+    parts += _rails((-w / 2 + 0.015, foot, -d / 2 + 0.03), (w / 2 - 0.015, seat - pad, d / 2 - 0.01), 2)
     parts.append(cushion((-w / 2, seat - pad, -d / 2 + 0.1), (w / 2, seat, d / 2), style))
     low, high, pivot = (-w / 2, seat - pad, -d / 2), (w / 2, h, -d / 2 + 0.15), (seat - pad, -d / 2 + 0.08)
     parts.append(leaned(cushion(low, high, style, role="back"), 0.15 + style.rake, *pivot))
