@@ -174,24 +174,18 @@ def _couch(
     return parts
 
 
-def multi_seat_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
-    """Two to four seat cushions, or one long one."""
-    count = int(np.clip(round(size[0] / choices.between("count", 0.6, 0.85)), 2, 4))
-    return _couch(size, style, choices, 1 if choices.chance("form", 0.12) else count)
-
-
-def loveseat_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
-    """Two seats, or one cushion across."""
-    if style.back == "shell" and choices.chance("kind", 0.5):
+def sofa(
+    size: Size, style: Style, choices: Choices, most: int = 4, extra: float = 0.15, shell: float = 0.5
+) -> list[Solid]:
+    """A row of two to `most` seat cushions, or one long one, or shares of curved ones, more of a style of shells."""
+    if choices.chance("extra", extra) or (style.back == "shell" and choices.chance("kind", shell)):
         return _curved(size, style)
-    return _couch(size, style, choices, 1 if choices.chance("form", 0.2) or size[0] < 1.0 else 2)
+    count = int(np.clip(round(size[0] / choices.between("count", 0.6, 0.85)), 2, most))
+    alone = choices.chance("form", 0.12 if most > 2 else 0.2) or (most == 2 and size[0] < 1.0)
+    return _couch(size, style, choices, 1 if alone else count)
 
 
-def sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
-    """Any sofa: rows of cushions, or a curved one."""
-    if choices.chance("extra", 0.15) or (style.back == "shell" and choices.chance("kind", 0.5)):
-        return _curved(size, style)
-    return multi_seat_sofa(size, style, choices)
+multi_seat_sofa, loveseat_sofa = partial(sofa, extra=0.0, shell=0.0), partial(sofa, most=2, extra=0.0)
 
 
 def _curved(size: Size, style: Style, stand: Sequence[Solid] = (), seat: float = 0.43) -> list[Solid]:
