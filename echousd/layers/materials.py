@@ -77,7 +77,7 @@ def tints(base: Look, look: Look) -> dict[tuple[str, str], Any]:
         found[IMAGES["diffuseColor"], "float4 inputs:scale"] = (*tint_factor(base, look), 1.0)
     if not uneven(base):
         found["surface", "float inputs:roughness"] = look.rough
-    elif look.gloss != 1:
+    else:
         found[IMAGES["roughness"], "float4 inputs:scale"] = (*(look.gloss,) * 3, 1.0)
     return found
 
@@ -111,8 +111,7 @@ def write_palettes(
     pens = pen.variants(root, "palette", looks, chosen)
     for name, base in sorted(looks[chosen].items()):  # bytes must not show the order of a set
         every = {harmony: tints(base, looks[harmony][name]) for harmony in pens}
-        for at in sorted({at for told in every.values() for at in told}):
-            alike = all(told.get(at) == every[chosen].get(at) for told in every.values())
+        for (part, words), value in every[chosen].items():
+            alike = all(told[part, words] == value for told in every.values())
             for harmony, inside in {chosen: pen}.items() if alike else pens.items():  # once, beside the variants
-                if at in every[harmony]:
-                    inside.over(f"{scope}/{name}/{at[0]}", {at[1]: every[harmony][at]})
+                inside.over(f"{scope}/{name}/{part}", {words: every[harmony][part, words]})

@@ -106,14 +106,12 @@ def say(spec: Sdf.PrimSpec, values: Mapping[str, Any], apis: Iterable[str] = (),
 
 @cache
 def _parsed(words: str) -> tuple[str, Sdf.ValueTypeName | None, Any, Sdf.Variability, bool, bool]:
-    """Name, type (None = a relationship), class of the value and variability of a property, whether it is custom, and a
-    connection."""
+    """Name, type (None = a relationship), class and variability of a property, whether it is custom, a connection."""
     *before, name = words.split()
     name = name.removesuffix(".connect")
     kind = None if before[-1] == "rel" else Sdf.ValueTypeNames.Find(before[-1])
     variability = UNIFORM if "uniform" in before else Sdf.VariabilityVarying
-    held = kind and kind.type.pythonClass
-    return name, kind, held, variability, "custom" in before, words.endswith(".connect")
+    return name, kind, kind and kind.type.pythonClass, variability, "custom" in before, words.endswith(".connect")
 
 
 def ops(**steps: tuple[str, Any]) -> dict[str, Any]:
