@@ -106,3 +106,17 @@ def test_what_is_missed_by_a_hair_is_moved_by_as_much() -> None:
     after = search.swept(state, [0])
     assert not search.faults(after)[1]
     assert abs(after.position[0, 2] - state.position[0, 2]) < 0.02
+
+
+@pytest.mark.parametrize(("aside", "moves"), [(0.2, False), (0.39, True)])
+def test_a_table_goes_towards_the_middle_of_its_free_floor_where_nothing_is_wrong(aside, moves):
+    chairs = [(aside + along, 0, across) for across in (-0.6, 0.6) for along in (-0.4, 0.4)]
+    size, floor = [(1.6, 0.75, 0.9), *[(0.45, 0.9, 0.5)] * 4], FLOOR / np.abs(FLOOR).max(0) * (1.5, 1.6)
+    words, at = ["dining_table", *["dining_chair"] * 4], [(aside, 0, 0), *chairs]
+    found = problem(words, size, at, [0, 0, 0, np.pi, np.pi], floor=floor)
+    search, state = Search(found), State(found.position, found.yaw, np.zeros(5))
+    total, wrong = search.faults(state)
+    assert not wrong
+    after, _ = search.eased(state, total)
+    assert (after.position[0, 0] < aside - 0.1) == moves
+    np.testing.assert_allclose(after.position[1:, 0] - after.position[0, 0], [-0.4, 0.4] * 2, atol=1e-6)

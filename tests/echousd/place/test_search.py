@@ -373,19 +373,6 @@ def test_chairs_are_seated_where_they_are_told_to_be():
     assert search.faults(state)[0] - search.faults(after)[0] > 2 * COST["relations"][0]
 
 
-@pytest.mark.parametrize(("aside", "moves"), [(0.2, False), (0.39, True)])
-def test_a_table_goes_towards_the_middle_of_its_free_floor_where_nothing_is_wrong(aside, moves):
-    chairs = [(aside + along, 0, across) for across in (-0.6, 0.6) for along in (-0.4, 0.4)]
-    size, floor = [(1.6, 0.75, 0.9), *[(0.45, 0.9, 0.5)] * 4], FLOOR / np.abs(FLOOR).max(0) * (1.5, 1.6)
-    words, at = ["dining_table", *["dining_chair"] * 4], [(aside, 0, 0), *chairs]
-    search, state = searched(words, size, at, [0, 0, 0, np.pi, np.pi], floor=floor)
-    total, wrong = search.faults(state)
-    assert not wrong
-    after, _ = search.eased(state, total)
-    assert (after.position[0, 0] < aside - 0.1) == moves
-    np.testing.assert_allclose(after.position[1:, 0] - after.position[0, 0], [-0.4, 0.4] * 2, atol=1e-6)
-
-
 def test_a_bed_comes_beside_its_twin_with_the_nightstand_that_they_share_between():
     words, size = ["single_bed", "single_bed", "nightstand"], [(1.0, 0.9, 2.0), (1.0, 0.9, 2.0), (0.5, 0.5, 0.4)]
     at, none = np.array([(-1.2, 0, -0.98), (1.48, 0, 1.2), (-0.35, 0, -1.75)]), np.zeros(3, bool)
