@@ -47,7 +47,7 @@ def embree(triangles: np.ndarray) -> Tree:
 class World(NamedTuple):
     """What rays run through: the tree, what is in it, the camera, pixels across, shifts of the first; what light is
     thrown back, what the sun gives to what faces it, whether the picture is fine, how much brighter shades are than
-    told, and the mean light, by colour; and the images as they are seen."""
+    told, and the mean light, by colour; the images as they are seen; and the shadows at feet."""
 
     tree: Tree
     scenery: Scenery
@@ -60,6 +60,7 @@ class World(NamedTuple):
     glow: np.ndarray = np.ones(3, np.float32)
     white: np.ndarray = np.ones(3, np.float32)
     atlas: Any = None
+    contact: Any = None
 
     @property
     def rows(self) -> int:

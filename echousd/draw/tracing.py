@@ -8,6 +8,7 @@ from PIL import Image, ImageFilter
 
 from echomodel.late import lates
 from echomodel.triangles import along, area_normals, cross, unit
+from echousd.draw.contact import Contact
 from echousd.draw.indoors import DIM, GLOWING, LUMA, OWN, RIM, SUN, Bounced, evened, exposure, rolled
 from echousd.draw.rays import BLOCK, Seen, World, camera_rays, embree, even, first_hit, free, on_sphere, shifts, way_to
 from echousd.draw.scenery import CLOTH, SKY_LIGHT, Scenery, next_room, outside
@@ -323,10 +324,11 @@ def _colored(world: World, everything: Seen, falling: np.ndarray) -> np.ndarray:
     for here, seen in everything.blocks():
         light = falling[:, here]
         looks = seen.face, seen.bary, _breadth(world, seen), world.atlas
-        color, fallen = scenery.colors(*looks), light[:3] + light[4] * sun
+        color, soft = scenery.colors(*looks), light[:3] * world.contact.left(seen.point, seen.normal)
+        fallen = soft + light[4] * sun
         if world.fine:
             turn = turned(scenery, seen.normal, *looks)
-            fallen = tilted(light[:3], light[5:], light[4] * sun, world.towards, seen.normal, turn)
+            fallen = tilted(soft, light[5:], light[4] * sun, world.towards, seen.normal, turn)
         fallen = evened(fallen, world.white, world.view.inside)
         color += np.float32(SHEEN) * (1 - color)
         metal = scenery.gloss.take(seen.face) > METAL
@@ -485,6 +487,7 @@ def _lit(world: World) -> World:
 
     Light is found at places that an eye in it and those places see, and thrown on `TURNS` times.
     """
+    world = world._replace(contact=Contact(world.scenery))
     rng, coarse = np.random.default_rng(0), world._replace(fine=False)
     point, normal = world.view.start[:, None].astype(np.float32), np.zeros((3, 1), np.float32)
     met: list[tuple[np.ndarray, ...]] = []

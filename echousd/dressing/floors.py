@@ -12,7 +12,7 @@ from echousd.dressing.setting import Setting, Standing, Thing, around, rectangle
 from echousd.dressing.stories import Wish
 from echousd.dressing.walls import walls_of
 
-PILE = 0.008  # metres; furniture stands on the floor below, through the rug
+PILE = 0.012  # metres; furniture stands on the floor below, through the rug
 FROM_WALL = 0.12
 LARGEST, ALONE = (4.2, 3.4), (2.6, 1.7)  # metres: of rugs, and of one that nothing stands on
 LEAST, SHOWS = 1.2, 0.3  # m² of a rug; metres by which it is wider than what stands on it

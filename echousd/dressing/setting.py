@@ -12,7 +12,7 @@ from echomodel.boxes2d import outline, seen, turned
 from echomodel.dressing import KINDS
 from echomodel.dressing import thing as solids_of
 from echomodel.openings import STEP, Opening, free_area, zone
-from echomodel.triangles import bounds_of, spans_of
+from echomodel.triangles import bounds_of, outlines, spans_of
 from echomodel.vocabulary import Category, RoomStyle, vocabulary
 from echousd.dressing.stories import TABLE, Story, story
 from echousd.shapes.geometry import Collider, Geometry, Origin
@@ -225,13 +225,8 @@ def _section(thing: Standing, number: int, low: float, high: float) -> shapely.G
     corners = thing.pieces[number]
     least, most = spans_of(corners[..., 1])
     corners = corners[(most > low) & (least < high)]
-    start, end = corners.reshape(-1, 3), np.roll(corners, -1, axis=1).reshape(-1, 3)
-    found = [start[(start[:, 1] > low) & (start[:, 1] < high)]]
-    for level in (low, high):  # where the sides of long triangles pass through
-        over = (start[:, 1] - level) * (end[:, 1] - level) < 0
-        share = (level - start[over, 1]) / (end[over, 1] - start[over, 1])
-        found.append(start[over] + share[:, None] * (end[over] - start[over]))
-    inside = np.concatenate(found)[:, [0, 2]]
+    points, through = corners.reshape(-1, 3), (outlines(corners, level)[0].reshape(-1, 2) for level in (low, high))
+    inside = np.concatenate([points[(points[:, 1] > low) & (points[:, 1] < high)][:, [0, 2]], *through])
     # a line has the hull of its points and is one object rather than thousands
     return shapely.convex_hull(shapely.linestrings(np.concatenate([inside, inside[:1]])))
 

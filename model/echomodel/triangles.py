@@ -113,6 +113,17 @@ def area_normals(triangles: np.ndarray) -> np.ndarray:
     return cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
 
 
+def outlines(triangles: np.ndarray, level: float) -> tuple[np.ndarray, np.ndarray]:
+    """Where triangles (f, 3, 3) pass through a height: ends in plan (x, z), (k, 2, 2), and which do, (k,) int."""
+    over = triangles[..., 1] > level
+    which = np.flatnonzero(over.any(1) & ~over.all(1))
+    start, end = triangles[which], np.roll(triangles[which], -1, axis=1)
+    through = over[which] != np.roll(over[which], -1, axis=1)
+    start, end = start[through], end[through]
+    share = (level - start[:, 1:2]) / (end[:, 1:2] - start[:, 1:2])
+    return (start + share * (end - start))[:, [0, 2]].reshape(-1, 2, 2), which
+
+
 def spread(triangles: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """(count, 3) points of triangles (f, 3, 3) that have any area, and the triangle that each is on, (count,) int.
 

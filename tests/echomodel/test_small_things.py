@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from echomodel.dressing import FORMS, KINDS, thing, usual
+from echomodel.dressing import FORMS, KINDS, PRINTS, thing, usual
 from echomodel.dressing.books import book_size
+from echomodel.dressing.textiles import BOUND
 from echomodel.furniture.solids import pieces_of
 
 
@@ -62,3 +63,14 @@ def test_what_many_rooms_have_is_of_many_forms(kind, least):
         points = np.concatenate([p.vertices for p in pieces_of(thing(kind, size, np.random.default_rng(seed)), size)])
         found.add(np.round((points - points.min(0)) / np.ptp(points, axis=0) / 0.02).astype(int).tobytes())
     assert len(found) >= least
+
+
+@pytest.mark.parametrize("kind", [kind for kind, row in KINDS.items() if row.name == "rug" and kind in PRINTS])
+def test_a_rug_has_a_bound_edge_around_its_pile_and_tassels_where_it_is_fringed(kind):
+    pile, edge, *ends = thing(kind, np.array([2.0, 0.012, 1.4]), np.random.default_rng(0))
+    inner, outer = (np.abs(solid.mesh()[0]) for solid in (pile, edge))
+    assert pile.material == kind != edge.material
+    assert (outer - inner.max(0))[:, [0, 2]].max(0) == pytest.approx(BOUND, abs=1e-6)
+    assert 0.5 * inner[:, 1].max() < outer[:, 1].max() < inner[:, 1].max()  # one steps down to the floor
+    assert len(ends) == 2 * PRINTS[kind].get("fringed", False)
+    assert all(np.abs(end.mesh()[0][:, 0]).max() == pytest.approx(1.0, abs=0.01) for end in ends)

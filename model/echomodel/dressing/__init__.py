@@ -65,7 +65,8 @@ def _kinds() -> dict[str, Kind]:
     made = {}
     for name, row in rows.items():
         forms = row.pop("forms", [row.pop("parts")] if "parts" in row else [])
-        program = _form(forms) if forms else Late(f"{__name__}.{row.pop('module')}:{name}")
+        program = _form(forms) if forms else Late(f"{__name__}.{row.pop('module')}:{row.pop('program', name)}")
+        program = partial(program, **row.pop("set", {}))
         made[name] = Kind(program=program, low=tuple(row.pop("low")), high=tuple(row.pop("high")), **row)
     for name, row in PRINTS.items():
         if kind := made.get(BUILT.get(row["form"], name.partition("_")[0])):

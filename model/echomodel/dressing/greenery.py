@@ -1,7 +1,5 @@
 """What grows in pots, and those: of pottery, turned on a wheel."""
 
-from functools import partial
-
 import numpy as np
 
 from echomodel.furniture.carpentry import Size
@@ -9,8 +7,6 @@ from echomodel.furniture.solids import Lathe, Solid
 from echomodel.late import Late
 
 grown, species = Late("echomodel.furniture.plants:grown"), Late("echomodel.furniture.plants:species")
-
-
 POTS = ([0.78, 0.9, 1.0], [0.95, 1.0, 1.0], [0.7, 1.0, 0.92], [0.6, 0.95, 1.0, 0.86], [1.0, 0.86, 0.8])
 POTTERY = ("ceramic", "ceramic", "enamel", "wicker", "soil", "metal")
 
@@ -26,7 +22,3 @@ def small_plant(size: Size, rng: np.random.Generator, share: float = 0.27, where
     pot = Lathe(profile=np.concatenate([outer, inner, foot]), material=str(rng.choice(POTTERY)))
     soil = Lathe(profile=np.array([[0.9 * radius * shape[-1], at * tall] for at in (0.7, 0.9)]), material="soil")
     return [pot, soil, *grown(kind, 0.88 * tall, size, radius, rng)]
-
-
-floor_plant = partial(small_plant, share=0.3, where="floor")
-pot_plant = partial(small_plant, share=0.4)  # where there is no room for more than the pot

@@ -1,13 +1,12 @@
-"""What hangs on walls and stands about: pictures, mirrors, clocks, a lamp's cable."""
+"""What hangs on walls and stands about: pictures, mirrors, clocks."""
 
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 
 from echomodel.dressing import any_of
 from echomodel.furniture.carpentry import Size, box, framed
-from echomodel.furniture.solids import Block, Solid, rotation, tube, turned
+from echomodel.furniture.solids import Block, Solid, rotation, turned
 
 FRAMES = ("frame", "frame", "ebony", "ebony", "enamel", "metal", "")  # of what; "" = canvas without a frame
 
@@ -37,9 +36,6 @@ def mirror(size: Size, rng: np.random.Generator, powers: Sequence[float] = (60.0
     return [rim, turned(back, (w / 2 - 0.018, h / 2 - 0.018), d, material="mirror", turn=turn, power=power)]
 
 
-round_mirror, tall_mirror = partial(mirror, powers=(2.0,)), partial(mirror, powers=(4.0, 60.0))
-
-
 def clock(size: Size, rng: np.random.Generator, marks: int = 0) -> list[Solid]:
     """A clock with its back at the wall, its case round or nearly square, its rim narrow or wide, at some time."""
     w, h, d = size
@@ -58,17 +54,3 @@ def clock(size: Size, rng: np.random.Generator, marks: int = 0) -> list[Solid]:
         half3 = np.array([half, (high - low) / 2 * h, d * 0.02])
         parts.append(Block(centre=centre, half=half3, turn=turn, material="soil"))
     return parts
-
-
-wall_clock = partial(clock, marks=12)
-
-
-def cable(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A lamp's cable on the floor, from the lamp (its front, +Z) to the plug at the wall."""
-    w, h, d = size
-    radius = h / 2
-    along = np.linspace(0.0, 1.0, max(8, int(d / 0.08)))
-    bend = np.sin(np.pi * along) * np.sin(2 * np.pi * along * rng.uniform(0.6, 1.1) + rng.uniform(0, 3))
-    x = bend / max(float(np.abs(bend).max()), 1e-6) * (w / 2 - radius)
-    line = np.stack([x, np.full_like(x, radius), (along - 0.5) * (d - h)], 1)
-    return [tube(line, radius, "screen"), box((-0.011, 0, -d / 2), (0.011, h, -d / 2 + 0.04), "screen", h * 0.3)]

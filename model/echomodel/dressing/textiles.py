@@ -1,80 +1,60 @@
 """Cloth: rugs, curtains, cushions, throws."""
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
-from echomodel.dressing import any_of
+from echomodel.dressing import PRINTS, any_of
 from echomodel.furniture.carpentry import Size, box
 from echomodel.furniture.cloth import Sheet, Slumped, pillow, seam
 from echomodel.furniture.solids import Solid, rotation, tube, turned
 
+BOUND, TASSEL, APART = 0.014, 0.055, 0.03  # metres of a rug that its edge and tassels take, and between these
+EDGES = {"cloth": "cushion", "cloth2": "drape", "blanket": "velvet", "accent": "accent_plain"}  # by what is woven in
 LIES = (8, 24)  # cells in which a throw knows what it lies on
-FOLD, GATHERED = 0.14, 0.028  # metres of curtain from one fold to the next; of a throw from the highest to the lowest
 FULL = (0.4, 1.0)  # of the fullest fold at a foot, the others
 BREAK = (0.05, 0.3)  # share of its height over its foot where a curtain breaks, and of a fold that is less deep there
-FRINGE = 0.045  # metres that threads hang from the ends of a throw
+GATHERED, FRINGE = 0.028, 0.045  # metres of a throw from the highest to the lowest; that threads hang from its ends
 BENDS, ROUND = (np.arange(10) + 0.5) * np.pi / 5, 0.075  # where in a fold, radians, points are; wider than a wave there
 DRAPES = ("curtain", "curtain", "linen", "drape", "drape", "velvet", "drape_striped")  # what curtains are of
 THROWS = ("accent_cloth", "accent_cloth", "accent_striped", "accent_checked")
 
 
-def rug(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid]:
-    """A rectangle of pile; `shown`: a row of `prints.toml` that is woven into it."""
-    w, h, d = size
-    return [box((-w / 2, 0, -d / 2), (w / 2, h, d / 2), shown or any_of("rug", "rug", rng), h * 0.45)]
+def rug(size: Size, rng: np.random.Generator, shown: str = "", form: str = "rug") -> list[Solid]:
+    """Pile in a bound edge, a rectangle, some with tassels at both ends, or `form` "round", also oval; `shown`: a row
+    of `prints.toml` that is woven into it."""
+    (w, h, d), shown = size, shown or any_of("rug", form, rng)
+    tassels = [_tassels(w / 2, 0.6 * h, d - 2 * BOUND, rng)] * bool(PRINTS[shown].get("fringed"))
+    ends = [replace(one, turn=rotation(y=turn)) for turn in (0, np.pi) for one in tassels]
+    bound = EDGES.get(PRINTS[shown]["of"][0].get("color", ""), "linen")
+    made: list[Solid] = []
+    for material, out, high in ((shown, BOUND, h), (bound, 0.0, 0.85 * h)):
+        x, z = w / 2 - out - TASSEL * len(tassels), d / 2 - out
+        round_ = turned((0, 0, 0), (x, z), high, rounding=0.45 * high, material=material)
+        made.append(round_ if form == "round" else box((-x, 0, -z), (x, high, z), material, 0.45 * high))
+    return made + ends
 
 
-def round_rug(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid]:
-    """A round or oval of pile, as `rug`."""
-    w, h, d = size
-    return [turned((0, 0, 0), (w / 2, d / 2), h, rounding=h * 0.45, material=shown or any_of("rug", "round", rng))]
+def _tassels(end: float, high: float, wide: float, rng: np.random.Generator) -> Solid:
+    """Those of the end of a rug at x = `end`, over `wide` metres."""
+    z = np.linspace(-wide / 2, wide / 2, 2 * round(wide / APART) + 1)
+    tips = end - TASSEL * np.where(np.arange(len(z)) % 2, rng.uniform(0, 0.3, len(z)), 0.75)
+    x, y = np.stack([np.full(len(z), end - TASSEL), tips], 1), np.broadcast_to((high, 0.3 * high), (len(z), 2))
+    front = np.stack([x, y, np.repeat(z, 2).reshape(-1, 2)], -1)
+    return Sheet(front=front, back=front * (1, 0, 1), material="linen")
 
 
-def curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """One curtain in loose folds below rings, which spread towards its foot."""
-    return [*_hung(size, rng, FOLD, top=0.65, drift=0.8, head=0.03), *_rings(size, FOLD)]
-
-
-def tied_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """One curtain that a band of its cloth holds together below its middle."""
-    w, h, d = size
-    cloth = drape(rng)
-    band = turned((0, 0.37 * h, 0), (0.34 * w, 0.4 * d), 0.04, rounding=0.012, power=3.0, material=cloth)
-    return [*_hung(size, rng, FOLD, top=0.5, drift=0.3, material=cloth, tied=0.4), band]
-
-
-def eyelet_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """One curtain in even waves from its rod to its foot, as eyelets make them."""
-    return [*_hung(size, rng, FOLD, top=1.0, drift=0.15), *_rings(size, FOLD, below=0.02)]
-
-
-def drape(rng: np.random.Generator) -> str:
-    return str(rng.choice(DRAPES))
-
-
-def _rings(size: Size, apart: float, below: float = 0.0) -> list[Solid]:
-    """Rings on a rod, about `apart` metres from one to the next, their highest points `below` the head of a curtain."""
-    w, h, d = size
-    r = min(0.018, 0.45 * d)
-    across = np.linspace(0.03 - w / 2, w / 2 - 0.03, max(2, round(w / apart)))
-    on_edge, high = rotation(z=np.pi / 2), h - below - r
-    return [turned((x, high, 0), (r, r), 0.005, turn=on_edge, material="metal") for x in across]
-
-
-def _hung(
+def curtain(
     size: Size, rng: np.random.Generator, fold: float, *, top: float, drift: float, narrow: float = 0.04,
-    material: str = "", head: float = 0.0, tied: float = 0.0,
+    material: str = "", head: float = 0.0, tied: float = 0.0, rings: float | None = None,
 ) -> list[Solid]:  # fmt: skip
     """Cloth in round folds of about `fold` metres, no two alike, at its head `top` times as deep and by `narrow` of its
     width less wide; they wander by `drift` of a fold from head to foot.
 
     `head`: metres from the top of `size` to that of the cloth, which is one of `DRAPES` where no `material` is told.
-    `tied`: share of its width that is drawn in below its middle.
+    `tied`: share of its width that a band draws in below its middle. `rings`: metres from the top to those of a rod.
     """
-    w, h, d = size
-    cloth = material or drape(rng)
+    (w, h, d), cloth = size, material or str(rng.choice(DRAPES))
     count = max(2, round(w / fold))
     phase, wander = rng.uniform(0, 2 * np.pi, 4), drift * rng.uniform(-1, 1, 3)
     turn = (np.arange(count)[:, None] * 2 * np.pi + BENDS).ravel()
@@ -93,12 +73,13 @@ def _hung(
         z = (d - 0.012) / 2 * deep * (1 + slack * (uneven - 1)) * np.cos(turn)
         rows.append(np.stack([x, np.full_like(x, share * (h - head)), z], 1))
     front, thick = np.stack(rows), np.array([0, 0, 0.004])
-    return [Sheet(front=front + thick, back=front - thick, material=cloth)]
-
-
-# narrow pleats at its head and a wide foot; thin cloth in many small folds, through which light comes
-pleated_curtain = partial(_hung, fold=0.9 * FOLD, top=0.3, drift=0.5, narrow=0.16)
-sheer_curtain = partial(_hung, fold=0.85 * FOLD, top=0.5, drift=0.8, material="sheer")
+    made: list[Solid] = [Sheet(front=front + thick, back=front - thick, material=cloth)]
+    r, across = min(0.018, 0.45 * d), np.linspace(0.03 - w / 2, w / 2 - 0.03, count)
+    for x in across if rings is not None else ():
+        made.append(turned((x, h - rings - r, 0), (r, r), 0.005, turn=rotation(z=np.pi / 2), material="metal"))
+    if tied:
+        made.append(turned((0, 0.37 * h, 0), (0.34 * w, 0.4 * d), 0.04, rounding=0.012, power=3.0, material=cloth))
+    return made
 
 
 CLOTHS = ("accent_cloth", "accent_plain", "accent_striped", "accent_checked", "blanket", "velvet", "linen", "drape")
@@ -122,19 +103,15 @@ def cushion(size: Size, rng: np.random.Generator, shown: str = "", lie: tuple[fl
     return [Slumped(material=one.material, of=one, **form) for one in made] if lean + bend else made
 
 
-lumbar_cushion = cushion  # long and low, for the small of the back
-
-
 def throw(size: Size, rng: np.random.Generator, lie: tuple[float, ...] = ()) -> list[Solid]:
     """A blanket over the foot of a bed: it lies across, follows what is below down to its edges, and hangs down at both
     sides by its height, where it ends in fringes.
 
     `lie`: how far below its top the bed is, metres, in `LIES` cells from the head and from the left.
     """
-    w, h, d = size
+    (w, h, d), turn = size, np.linspace(0, np.pi / 2, 4)
     round_off, fringe = 0.05, min(FRINGE, 0.25 * h)
     flat = w / 2 - round_off
-    turn = np.linspace(0, np.pi / 2, 4)
     corner = np.stack([flat + round_off * np.sin(turn), h - round_off * (1 - np.cos(turn))], 1)
     hang = np.stack([np.full(3, w / 2), np.linspace(h - round_off, fringe, 4)[1:]], 1)
     side = np.concatenate([[[share * flat, h] for share in np.linspace(0, 1, 12)[1:-1]], corner, hang])

@@ -14,6 +14,7 @@ from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.draw import tracing
+from echousd.draw.contact import Contact
 from echousd.draw.drawables import image_of
 from echousd.draw.from_files import render
 from echousd.draw.indoors import BRIGHT, LUMA, SHARE, Bounced, evened, exposure, read_lights
@@ -568,3 +569,30 @@ def test_a_room_is_drawn_in_the_light_that_is_asked_for(tmp_path):
     assert evening.mean() < 0.9 * day.mean()
     with pytest.raises(ValueError, match="light is 'dusk', allowed: day, evening, night"):
         render(path, size=48, light="dusk")
+
+
+def upright_sheet(high: float) -> np.ndarray:
+    """(4, 3) corners of a sheet at x = 0 that stands on the floor."""
+    return np.array([(0, 0, -0.1), (0, 0, 0.1), (0, high, 0.1), (0, high, -0.1)])
+
+
+@pytest.mark.parametrize(
+    ("high", "at", "dark"), [(0.5, 0.0, True), (0.5, 0.012, True), (0.012, 0.0, True), (0.012, 0.012, False)]
+)
+def test_the_floor_is_dark_where_something_stands_on_it_or_a_rug_ends_and_rugs_where_something_stands(high, at, dark):
+    contact = Contact(with_sheet(box_room(sky=0.0, **LAMP)[0], upright_sheet(high)))
+    x, up = np.array([0.005, 0.02, 0.3]), np.array([(0.0, 1.0, 0.0)] * 3).T
+    near, beside, far = contact.left(np.stack([x, 0 * x + at, 0 * x]), up)
+    assert far == 1.0
+    assert near < beside < 0.95 if dark else near == 1.0
+    assert (contact.left(np.stack([x, 0 * x + at, 0 * x]), up[[1, 0, 2]]) == 1).all()  # on what stands itself
+
+
+def test_a_picture_shows_where_feet_meet_the_floor(monkeypatch):
+    scenery, down = box_room(sky=0.0, **LAMP)
+    scenery, down = with_sheet(scenery, upright_sheet(0.3), flat_colors=np.full((2, 3), 0.05)), replace(down, half=0.1)
+    there = trace(scenery, down, 48, rays=2).mean(-1)
+    monkeypatch.setattr(Contact, "left", lambda self, point, normal: np.ones(point.shape[1], np.float32))
+    gain = there / trace(scenery, down, 48, rays=2).mean(-1)
+    assert gain.min() < 0.8
+    assert np.quantile(gain, 0.7) > 0.95
