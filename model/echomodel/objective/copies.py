@@ -34,9 +34,6 @@ class Watched(Plan):
             self._noted(ends[rows])
         return rows
 
-    def everywhere(self, number: int) -> Array:
-        return self._noted(super().everywhere(number))
-
     def beside(self, i: Array, others: Array) -> tuple[Array, Array]:
         row, k = super().beside(i, others)
         return row, self._noted(k)
@@ -161,9 +158,6 @@ class Copies(Plan):
         i, predicate, j = self.template.stated_pairs
         differ = self._differ[i, j]
         return self._tiled(i[differ]), self._again(predicate[differ]), self._tiled(j[differ])
-
-    def everywhere(self, number: int) -> Array:
-        return number + self._shift[:, 0]
 
     @cached_property
     def rooms(self) -> list[tuple[Array, np.ndarray, tuple[Opening, ...]]]:

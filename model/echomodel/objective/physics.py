@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, full, held, put
+from echomodel.arrays import Array, at_least, cast, full, held, put
 from echomodel.floors import Walls, edges, footprint, signed_area
 from echomodel.late import Late
 from echomodel.objective.plan import FAR, Found, Plan, found, joined, nobody
@@ -100,9 +100,9 @@ def stated(predicate: str) -> Callable[[Plan], Found]:
 
 def placed(plan: Plan) -> Found:
     """A piece stands in the room as the graph says: against a wall, in a corner, between two others."""
-    out = nobody(plan.size)
+    out, box = nobody(plan.size), cast(np.arange(len(plan)) % max(len(plan.first), 1), plan.scene)  # in each copy
     for one in plan.stated:
-        rows = [plan.everywhere(number) for number in (one.subject, *one.others)]
+        rows = [plan.those(box == number) for number in (one.subject, *one.others)]
         every = {number: Spread(plan.size[at], plan.position[at], plan.yaw[at])
                  for number, at in zip((one.subject, *one.others), rows, strict=True)}  # fmt: skip
         floor = plan.floor[int(plan.scene[one.subject])]

@@ -298,10 +298,6 @@ class Plan:
         i, _, j = self.stated_pairs
         return pairs(self, i, j, self.centres, oriented=rule_set(self.rules).oriented, fronts=self.fronts)
 
-    def everywhere(self, number: int) -> Array:
-        """(1,) int64, a box of the first room; of copies of one room (K,), in each of them."""
-        return full(self.scene, 1, number)
-
     # -- pairs -------------------------------------------------------------------------------------------------------
 
     def those(self, mask: Array) -> Array:
