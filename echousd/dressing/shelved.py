@@ -6,7 +6,7 @@ from echomodel.boxes2d import turned
 from echomodel.dressing.books import book_size, fitting_books
 from echousd.dressing.setting import Setting, Thing
 
-VOLUMES = 6  # kinds of single books that a row is of
+VOLUMES = 5  # kinds of single books that a row is of
 BETWEEN = 0.002  # metres from book to book
 
 
