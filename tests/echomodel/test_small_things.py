@@ -74,3 +74,11 @@ def test_a_rug_has_a_bound_edge_around_its_pile_and_tassels_where_it_is_fringed(
     assert 0.5 * inner[:, 1].max() < outer[:, 1].max() < inner[:, 1].max()  # one steps down to the floor
     assert len(ends) == 2 * PRINTS[kind].get("fringed", False)
     assert all(np.abs(end.mesh()[0][:, 0]).max() == pytest.approx(1.0, abs=0.01) for end in ends)
+
+
+def test_a_throw_is_bound_along_both_hems():
+    size = np.array([1.8, 0.25, 0.5])
+    cloth, *rest = thing("throw", size, np.random.default_rng(0))
+    hems = [one.mesh()[0] for one in rest if one.material == "linen" != cloth.material]
+    assert sorted(np.sign(hem[:, 2].mean()) for hem in hems) == [-1, 1]
+    assert all(np.ptp(hem[:, 0]) > 0.95 * size[0] and abs(hem[:, 2]).min() > 0.2 * size[2] for hem in hems)

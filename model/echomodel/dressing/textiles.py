@@ -14,7 +14,7 @@ EDGES = {"cloth": "cushion", "cloth2": "drape", "blanket": "velvet", "accent": "
 LIES = (8, 24)  # cells in which a throw knows what it lies on
 FULL = (0.4, 1.0)  # of the fullest fold at a foot, the others
 BREAK = (0.05, 0.3)  # share of its height over its foot where a curtain breaks, and of a fold that is less deep there
-GATHERED, FRINGE = 0.028, 0.045  # metres of a throw from the highest to the lowest; that threads hang from its ends
+GATHERED, FRINGE, HEM = 0.028, 0.045, 0.0058  # metres of a throw: of its folds, of threads at its ends, half a hem
 BENDS, ROUND = (np.arange(10) + 0.5) * np.pi / 5, 0.075  # where in a fold, radians, points are; wider than a wave there
 DRAPES = ("curtain", "curtain", "linen", "drape", "drape", "velvet", "drape_striped")  # what curtains are of
 THROWS = ("accent_cloth", "accent_cloth", "accent_striped", "accent_checked")
@@ -125,13 +125,16 @@ def throw(size: Size, rng: np.random.Generator, lie: tuple[float, ...] = ()) -> 
     hanging, end = np.clip((h - profile[:, 1]) / max(h, 1e-6), 0, 1), np.abs(share[:, None])
     ripple = 0.018 * (1 + np.sin(2 * np.pi * deep / d * 2.5 + phase[0] + np.sign(x))) * hanging  # away from the bed
     skew = (0.03 * np.sin(2.2 * x + phase[1]) + 0.09 * (phase[2] / 3 - 1) * x) * (1 - hanging / 2)
-    gathered = deep * (1 - 0.16 * np.sin(1.4 * x + phase[2]) ** 2) + skew + 0.012 * np.sin(11 * x) * share[:, None]
+    gathered = (
+        deep * (1 - 0.16 * np.sin(1.4 * x + phase[2]) ** 2) + skew + 0.018 * np.sin(6 * x + phase[1]) * share[:, None]
+    )
     fold = 12 * deep + 1.6 * np.sin(2.1 * x + phase[0]) + 0.7 * np.sin(5.3 * x + phase[2]) + phase[1]
     # along its rows it lies in folds, and its hems on what is below
-    lower = lower + min(1.0, w) * GATHERED * np.maximum(np.abs(np.sin(fold)) ** 3, 0.9 * end**8)
+    lower = lower + min(1.0, w) * GATHERED * np.maximum(np.abs(np.sin(fold)) ** 3, 0.9 * end**5)
     front = np.stack([x + np.sign(x) * ripple, profile[:, 1] - lower * (1 - hanging), gathered], -1)
     under = 0.009 * (1 - 0.8 * end**6)  # thin at its hems
     back = front - np.stack([np.sign(x) * under * (hanging > 0), under * (hanging < 0.5), 0 * x], -1)
     material, knots = str(rng.choice(THROWS)), np.concatenate([front[:, 0], front[:, -1]])
     ends = [tube([knot, knot - (0, fringe * rng.uniform(0.7, 1.0), 0)], 0.004, material) for knot in knots]
-    return [Sheet(front=front, back=back, material=material), *ends]
+    hems = [tube((over + below) / 2, HEM, "linen") for over, below in zip(front[[0, -1]], back[[0, -1]], strict=True)]
+    return [Sheet(front=front, back=back, material=material), *hems, *ends]
