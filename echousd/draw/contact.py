@@ -19,13 +19,14 @@ class Contact:
         self.floor = float(scenery.triangles[scenery.largest[0], 0, 1])
         low, high = (each[[0, 2]] for each in scenery.bounds)
         self.low, self.cells = low[:, None], np.ceil((high - low) / CELL).astype(int)
-        image, layers = Image.new("L", tuple((2 * self.cells).tolist())), list[np.ndarray]()
+        image, layers = Image.new("L", tuple(self.cells.tolist())), list[np.ndarray]()
+        draw = ImageDraw.Draw(image)
         for over in OVER:
             lines, which = outlines(scenery.triangles, self.floor + over)
             dark = 255 * (1 - scenery.planes.luma.take(which) ** PALE)
-            for line, fill in zip((2 * (lines - low) / CELL).reshape(-1, 4).tolist(), dark.tolist(), strict=True):
-                ImageDraw.Draw(image).line(line, fill=int(fill), width=2)
-            layers.append(np.asarray(image.reduce(2).filter(ImageFilter.GaussianBlur(AROUND / CELL))).reshape(1, -1))
+            for line, fill in zip(((lines - low) / CELL).reshape(-1, 4).tolist(), dark.tolist(), strict=True):
+                draw.line(line, fill=int(fill))
+            layers.append(np.asarray(image.filter(ImageFilter.GaussianBlur(AROUND / CELL))).reshape(1, -1))
         self.dark = np.concatenate(layers, 1)
 
     def left(self, point: np.ndarray, normal: np.ndarray) -> np.ndarray:
