@@ -48,6 +48,23 @@ def test_the_distance_of_a_solid_agrees_with_its_mesh(name):
     assert ((exact < 0) & (ours < 0)).sum() / ((exact < 0) | (ours < 0)).sum() > 0.93
 
 
+@pytest.mark.parametrize("category", ["armchair", "lounge_chair", "loveseat_sofa"])
+def test_nothing_comes_out_behind_a_wall_bent_round_a_seat(category):
+    looked_at = 0
+    for seed in range(120):
+        rng = np.random.default_rng([seed, 5])
+        style = draw_style(rng)
+        parts = solids(category, style, draw_choices(rng), sample_size(category, rng, style))
+        walls = [part for part in parts if isinstance(part, Shell) and part.role == "back"]
+        for wall in walls:
+            for inside in (part for part in parts if part.role in ("base", "seat")):
+                x, _, z = (mesh_of([inside]).vertices - wall.centre).T
+                out = (np.abs(x) / wall.half[0]) ** wall.power + (np.maximum(-z, 0) / wall.half[1]) ** wall.power
+                assert out.max() < 1.0
+                looked_at += 1
+    assert looked_at >= 10
+
+
 @pytest.mark.parametrize("category", CATEGORIES)
 def test_a_piece_is_watertight_fills_its_size_and_survives_the_grid(category):
     for seed in range(3):

@@ -198,9 +198,10 @@ def _curved(size: Size, style: Style, stand: Sequence[Solid] = (), seat: float =
     seat, arms = min(seat, h * 0.6), (h - foot) * (0.58 + 0.3 * style.arm_height)
     parts = [*(stand or _legs(style, w * 0.78, d * 0.8, foot))]
     parts.append(bent((0, foot, d * 0.4), (w / 2, d * 0.9), wall, h - foot, arms, power=power, ease=2.8))
-    level, x, z, form = foot + 0.62 * (seat - foot), w / 2 - wall, d * 0.44, power + 1
-    parts.append(padded((0, foot, 0), (x + 0.3 * wall, d * 0.45), level - foot, role="base", power=form))
-    cushioned = cushion((-x, level, d * 0.04 - z), (x, seat, d * 0.04 + z), style, power=form)
+    # as round as the wall, or their corners come out behind it
+    level, x, z, middle = foot + 0.62 * (seat - foot), w / 2 - wall, d * 0.42, d * 0.06
+    parts.append(padded((0, foot, middle), (x, z - d * 0.03), level - foot, role="base", power=power))
+    cushioned = cushion((-x, level, middle - z), (x, seat, middle + z), style, power=power)
     return [*parts, cushioned, *corded(style, cushioned)]
 
 
