@@ -143,15 +143,13 @@ def brick(rows: int = 32, across: int = 8) -> Relief:
     return Relief(tone, 0.0006 * grain * (1 - joint[..., 0]) - 0.004 * joint[..., 0], 0.1 * joint[..., 0])
 
 
-def woven(threads: int = 176) -> Relief:
-    """Plain weave, flecked, in hardly any folds: what is firm would look like stone in more."""
+def woven(threads: int = 64) -> Relief:
+    """Plain weave of nearly one tone from afar, in hardly any folds: what is firm would look like stone in more."""
     u, v = _grid()
-    warp, weft = np.sin(2 * np.pi * threads * u), np.sin(2 * np.pi * threads * v)
-    over = np.sign(np.sin(np.pi * threads * u) * np.sin(np.pi * threads * v))
-    height = np.where(over > 0, np.abs(warp), np.abs(weft))
-    fleck = 0.6 * noise(31, 60.0, 160.0) + 0.6 * noise(32, 160.0, 60.0)
-    soft = noise(33, 4.0, 4.0, 3.0)
-    return Relief(1 + 0.12 * (height - 0.6) + 0.045 * fleck + 0.03 * soft, 0.0001 * height + 0.2 * creased())
+    over = np.sin(np.pi * threads * u) * np.sin(np.pi * threads * v) > 0
+    height = np.where(over, np.abs(np.sin(2 * np.pi * threads * u)), np.abs(np.sin(2 * np.pi * threads * v)))
+    yarn = 0.6 * noise(31, 24.0, 200.0) + 0.6 * noise(32, 200.0, 24.0)
+    return Relief(1 + 0.05 * height + 0.02 * yarn + 0.006 * noise(33, 4.0, 4.0, 3.0), 0.0001 * height + 0.2 * creased())
 
 
 @cache  # four cloths lie in the same

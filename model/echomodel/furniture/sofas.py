@@ -19,7 +19,8 @@ from echomodel.furniture.tufting import Tufted
 
 BODIES: list[dict[str, Any]] = list(tables("bodies.toml", __file__).values())
 padded = partial(turned, material="fabric")
-TOUCH = 0.003  # metres that cushions side by side press into one another
+TOUCH = {"seat": 0.006, "back": 0.016}  # metres that cushions side by side press into one another, by their role
+CLOSED = 0.016  # metres that what seats lie on reaches up into them, so that no gap is below their edges
 FLARED = 0.4  # softness up to which arms have no pad and flare
 
 
@@ -97,8 +98,8 @@ def _legs(style: Style, w: float, d: float, foot: float) -> list[Solid]:
 def _rails(low: tuple, high: tuple, count: int) -> list[Solid]:
     """What seats lie on: a body whose front is of so many firm panels, sewn together."""
     (x0, y0, _), (x1, y1, z1) = low, high
-    half, turn = np.array([y1 - y0, 0.09, (x1 - x0) / count]) / 2, np.roll(np.eye(3), 1, axis=0)
-    middles = ((x0 + (2 * k + 1) * half[2], (y0 + y1) / 2, z1 - 0.045) for k in range(count))
+    half, turn = np.array([y1 + CLOSED - y0, 0.09, (x1 - x0) / count]) / 2, np.roll(np.eye(3), 1, axis=0)
+    middles = ((x0 + (2 * k + 1) * half[2], y0 + half[0], z1 - 0.045) for k in range(count))
     panels = [Wrapped(np.array(at), turn, role="base", half=half, head=0.03, power=3.0) for at in middles]
     return [box(low, (x1, y1, z1 - 0.045), "fabric", 0.015, "base"), *panels]
 
@@ -108,7 +109,8 @@ def _cushions(
 ) -> list[Solid]:
     """A row of cushions from x0 to x1."""
     edges = pairwise(np.linspace(x0, x1, count + 1))
-    pads = [cushion((a - TOUCH, y0, z0), (b + TOUCH, y1, z1), style, **form) for a, b in edges]
+    touch = TOUCH[form.get("role", "seat")]
+    pads = [cushion((a - touch, y0, z0), (b + touch, y1, z1), style, **form) for a, b in edges]
     return [*pads, *corded(style, *(pad for pad in pads if pad.role == "seat"))]
 
 
