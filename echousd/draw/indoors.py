@@ -25,16 +25,16 @@ WHITER = 0.25  # how much less coloured the light of lamps is than told: no wall
 DIM = 0.004  # radiance at every place of a room without lamps and windows, so that one sees it
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
 # darker than comes to, by night and by day, and how much at most it is brightened for that.
-ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.58, 0.95), (0.34, 0.53), 70, 40.0
+ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.58, 0.95), (0.34, 0.6), 70, 40.0
 # Power of the light's brightness that eyes take from it, and inside whoever photographs rooms gives it; and what it
 # comes near to over the mean inside, where sun and lamps are blended in from darker exposures: floors keep their look.
 EVEN, LIMIT = (0.18, -0.15), (np.inf, 1.95)
 PALER = 0.32  # share of how its colour differs from the mean that they take from it, too
 WHITE, PAPER = 84, 0.95  # what so many of a hundred points are darker than comes to no more than that
-CONTRAST, KNEE = 1.5, 0.6  # power about what is bright, and from where on highlights are rolled off
+CONTRAST, KNEE = 1.55, 0.72  # power about what is bright, and from where on highlights are rolled off
 # Share of colours that keep their hue where they are bright, which film bleaches, and how much more coloured all are,
 # by night, when lamps are warm, not yellow, and by day.
-HUE, CHROMA = (0.5, 0.8), (1.0, 1.12)
+HUE, CHROMA = (0.5, 0.8), (1.0, 1.18)
 LUMA = np.array([0.2126, 0.7152, 0.0722], np.float32)
 DAY = 0.5  # radiance of the sky by day
 GREY = 0.5  # how much less coloured light from outside is than what lies there: ceilings over lawns stay white
@@ -196,14 +196,14 @@ def exposure(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> Callable
 
 
 def _filmic(level: np.ndarray, middle: float) -> np.ndarray:
-    """Contrast about a middle tone, and a shoulder from `KNEE` on."""
-    return rolled(middle * (np.maximum(level, 0) / middle) ** CONTRAST, KNEE)
+    """Contrast about a middle tone, and a shoulder."""
+    return rolled(middle * (np.maximum(level, 0) / middle) ** CONTRAST)
 
 
-def rolled(level: np.ndarray, knee: float = 0.72) -> np.ndarray:
-    """Bright values rolled off towards 1 from a knee on instead of clipped."""
-    over = np.maximum(level - knee, 0)
-    return np.where(level > knee, knee + (1 - knee) * over / (over + 1 - knee), level)
+def rolled(level: np.ndarray) -> np.ndarray:
+    """Bright values rolled off towards 1 from `KNEE` on instead of clipped."""
+    over = np.maximum(level - KNEE, 0)
+    return np.where(level > KNEE, KNEE + (1 - KNEE) * over / (over + 1 - KNEE), level)
 
 
 CELL = 0.5  # metres

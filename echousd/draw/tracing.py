@@ -25,6 +25,9 @@ PLACES, OFTEN, TURNS = (600, 1200), 3, 5
 # Metres from which on what stands near throws on all of its light, which is in a shadow itself, and of how much it
 # throws on more if it is white; what any surface mirrors of all around it.
 CREVICE, PALE, SHEEN = 1.0, 0.55, 0.05
+# As photographers of rooms throw light at ceilings: its share of the mean in the room, and metres below them that it
+# reaches; else they are grey, as lamps and windows shine downwards.
+THROWN, UPPERMOST = np.float32(0.25), 0.35
 # In fine pictures: metres within which what is met throws on what falls just there; factors that make of a place of the
 # unit square others that hardly depend on it, for the rays from there; share of the width on either side of an edge in
 # which light is asked more often and smoothed less, as shadows of feet are small.
@@ -325,6 +328,9 @@ def _colored(world: World, everything: Seen, falling: np.ndarray) -> np.ndarray:
         light = falling[:, here]
         looks = seen.face, seen.bary, _breadth(world, seen), world.atlas
         color, soft = scenery.colors(*looks), light[:3] * world.contact.left(seen.point, seen.normal)
+        if world.view.inside:
+            upper = seen.point[1] > scenery.bounds[1][1] - UPPERMOST
+            soft += THROWN * world.white[:, None].astype("f4") * np.clip(-seen.normal[1], 0, upper)
         fallen = soft + light[4] * sun
         if world.fine:
             turn = turned(scenery, seen.normal, *looks)

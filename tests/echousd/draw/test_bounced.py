@@ -1,10 +1,15 @@
-"""The coarse table of a room's light: what surfaces throw on to one another, by place and side."""
+"""The coarse table of a room's light: what surfaces throw on to one another, by place and side; light at ceilings."""
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
 
+import numpy as np
+from box_room import LAMP, box_room
+
+from echousd.draw import tracing
 from echousd.draw.indoors import Bounced
+from echousd.draw.views import view_matrix
 
 TABLE = Bounced.dark(np.zeros(3), np.array([4.0, 3.0, 2.0]))
 
@@ -39,3 +44,16 @@ def test_a_place_is_as_bright_as_what_was_found_there_and_others_as_their_side()
 
 def test_places_outside_of_a_room_are_those_at_its_border():
     assert np.isfinite(TABLE.radiance[:, rows((1, 0, 0), origin=(50.0, -9.0, 3.0))]).all()
+
+
+def test_light_is_thrown_at_the_ceiling_and_at_nothing_below_it(monkeypatch):
+    scenery, down = box_room(sky=0.0, **LAMP)
+    up = replace(down, matrix=view_matrix(np.array([0.0, 0.2, 0.0]), np.array([0.0, 3.0, 0.01])))
+    pictures = []
+    for share in (0.0, tracing.THROWN):
+        monkeypatch.setattr(tracing, "THROWN", np.float32(share))
+        monkeypatch.setattr(tracing, "exposure", lambda *_: lambda color: color / 20)
+        pictures.append([tracing.trace(scenery, view, 64, rays=2).mean() for view in (down, up)])
+    (floor, dark), (same, bright) = pictures
+    assert same == floor
+    assert 1.02 < bright / dark < 1.6
