@@ -21,7 +21,7 @@ from echousd.dressing.soft_tops import (
 )
 
 MORE = (1.9, 2.4)  # metres of a sofa with a third cushion in its middle, and with two
-OVER = 0.019  # metres of a throw's top over an arm
+OVER, SHORT, LONG = 0.019, (0.2, 0.3), (0.32, 0.45)  # metres of a throw's top over an arm, and that it hangs down
 RISE = 0.06  # metres that an arm rises along a throw at most: off a steeper one it slides, and a tub's walls are round
 # Shares of a cushion's width and height at which is looked for what is behind it, metres within which that is; from
 # where on a back is round; by which forms of cushions differ.
@@ -106,4 +106,6 @@ def over_arm(host: Standing, seat: Seat, side: float, rng: np.random.Generator) 
     arm = (level > seat.level + RIDGE) & (np.sign(side) * seat.x > 0.3 * host.size[0])
     if not 0.08 < arm.sum() * STEP < 0.34 or np.ptp(under[arm], axis=1).max() > RISE:
         return None
-    return across(host, seat, arm, z, deep, float(np.median(level[arm])) - seat.level - 0.04, OVER, rng)
+    high = float(np.median(level[arm]))
+    falls = np.minimum(rng.uniform(SHORT, LONG), (high - seat.level - 0.03, high - 0.12))  # over the seat, outside
+    return across(host, seat, arm, z, deep, falls[:: int(side)], OVER, rng)

@@ -17,6 +17,7 @@ LOW = 0.15  # share of a seat that is lower than its level: pillows, low arms an
 LEVEL, LIFTED = 0.003, 0.002  # metres: what is as high as that is one height; what stands so far over it is clear of it
 # Metres between folds of a bed, and over its middle from where on it is a board; places behind pillows for cushions.
 SOFT, BOARD, BEYOND = 0.04, 0.12, 12
+BESIDE = 0.04  # metres that a throw hangs beside what it lies on
 RAISED = 0.04  # metres that a thing is raised, or let down, at most so that it lies on the solids of a seat
 # Shares of a cushion's extents that it stands on, and the part of that which must be level.
 BASE, STEADY = np.array([0.9, 1.0, 0.6]), 0.6
@@ -171,13 +172,13 @@ def lying(
 
 
 def across(
-    host: Standing, seat: Seat, where: np.ndarray, z: float, deep: float, most: float, over: float,
+    host: Standing, seat: Seat, where: np.ndarray, z: float, deep: float, falls: np.ndarray, over: float,
     rng: np.random.Generator,
 ) -> Thing | None:  # fmt: skip
     """A throw across a bed or an arm, its middle at `z`, that lies on all of it; None where nothing flat of its height
     is.
 
-    `where`: (len(seat.x),) bool, what it lies on. `most`: metres that it hangs down at most.
+    `where`: (len(seat.x),) bool, what it lies on. `falls`: (2,) metres that it hangs down at its left and right.
     `over`: metres of its top over what is highest there.
     """
     under, x = seat.height[where][:, np.abs(seat.z - z) < deep / 2], seat.x[where]
@@ -187,13 +188,11 @@ def across(
     if not 0.25 < middle <= top < min(0.95, middle + BOARD):
         return None
     half = float(np.abs(x[(under > top - 0.2).any(1)]).max()) + STEP / 2
-    size = np.round([2 * half + 0.08, 0.012 + min(most, rng.uniform(0.2, 0.32)), deep], 3)
-    rows, columns = np.linspace(0, under.shape[1], LIES[0] + 1), np.linspace(-half, half, LIES[1] + 1)
-    near = min(0.06, 0.3 * half)
-    cells = [
-        [under[np.abs(x - at - half / LIES[1]) < near, max(int(k) - 2, 0) : int(k) + 6].max() for at in columns[:-1]]
-        for k in rows[:-1]
-    ]
-    lie = tuple(np.round(np.clip(top - np.array(cells), 0.0, BOARD), 3).ravel().tolist())
+    size, falls = np.round([2 * (half + BESIDE), falls.max(), deep], 3), np.round(falls, 3)
+    rows, columns = (np.linspace(0, under.shape[1], LIES[0]), np.arange(1, 2 * LIES[1], 2) / LIES[1] - 1)
+    columns = np.clip(columns * size[0] / 2, -half, half)
+    near = max(min(0.04, 0.3 * half), 1.6 * half / LIES[1])
+    cells = [[under[np.abs(x - at) < near, max(int(k) - 3, 0) : int(k) + 3].max() for at in columns] for k in rows]
+    lie = (*falls.tolist(), *np.round(np.clip(top - np.array(cells), 0.0, BOARD), 3).ravel().tolist())
     spot = host.to_room(np.array([[centre, top + over - size[1], z]]))[0]
     return Thing("throw", size, spot, host.yaw, host.name, int(rng.integers(1 << 30)), lie=lie)

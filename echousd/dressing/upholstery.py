@@ -10,7 +10,7 @@ from echousd.dressing.soft_tops import Design, Seat, across, corners_of, let_dow
 
 cushions_on, over_arm = lates("echousd.dressing.seats", "cushions_on", "over_arm")
 BURIED = 0.6  # share of its height that what lies on a seat may be in the cloth
-WIDE_BED, OVER = 1.3, 0.036  # metres: of a throw's top over a bed, whose cover lies in folds
+WIDE_BED, OVER = 1.3, 0.05  # metres: of a throw's top over a bed, whose cover lies in folds
 DRAPED = {"sofa": 0.9, "seat": 0.4}  # shares of sofas and armchairs with a blanket over an arm
 
 
@@ -77,5 +77,6 @@ def throws(setting: Setting) -> None:
         else:
             deep, everywhere = float(np.clip(0.3 * host.size[2], 0.4, 0.75)), np.full(len(seat.x), True)
             depths = (float(host.size[2]) / 2 - back - deep / 2 for back in (0.1, 0.2, 0.3))
-            over = (across(host, seat, everywhere, z, deep, 0.32, OVER, rng) for z in depths)
+            falls = np.full(2, rng.uniform(0.2, 0.32))
+            over = (across(host, seat, everywhere, z, deep, falls, OVER, rng) for z in depths)
         setting.put_first(filter(None, over), host=host.name, margin=0.0)

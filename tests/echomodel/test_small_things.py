@@ -6,7 +6,7 @@ import trimesh
 
 from echomodel.dressing import FORMS, KINDS, PRINTS, thing, usual
 from echomodel.dressing.books import book_size
-from echomodel.dressing.textiles import BOUND
+from echomodel.dressing.textiles import BOUND, LIES
 from echomodel.furniture.solids import pieces_of
 
 
@@ -76,9 +76,22 @@ def test_a_rug_has_a_bound_edge_around_its_pile_and_tassels_where_it_is_fringed(
     assert all(np.abs(end.mesh()[0][:, 0]).max() == pytest.approx(1.0, abs=0.01) for end in ends)
 
 
-def test_a_throw_is_bound_along_both_hems():
-    size = np.array([1.8, 0.25, 0.5])
-    cloth, *rest = thing("throw", size, np.random.default_rng(0))
-    hems = [one.mesh()[0] for one in rest if one.material == "linen" != cloth.material]
-    assert sorted(np.sign(hem[:, 2].mean()) for hem in hems) == [-1, 1]
-    assert all(np.ptp(hem[:, 0]) > 0.95 * size[0] and abs(hem[:, 2]).min() > 0.2 * size[2] for hem in hems)
+@pytest.mark.parametrize("seed", range(4))
+def test_a_throw_lies_in_folds_on_what_it_knows_and_its_hems_are_thin(seed):
+    size, lower = np.array([1.8, 0.25, 0.6]), np.zeros(LIES)
+    lower[:, LIES[1] // 2 :] = 0.06
+    (level,), (bent,) = (
+        thing("throw", size, np.random.default_rng(seed), lie=(0.25, 0.2, *by.ravel())) for by in (0 * lower, lower)
+    )
+    thick = np.linalg.norm(level.front - level.back, axis=2)
+    middle = np.abs(level.front[..., 0]) < 0.7
+    assert thick[[0, -1]].max() < 0.003 < 0.005 < thick[middle].max()
+    high = level.front[..., 1].copy()
+    high[~middle] = np.nan
+    assert np.nanmax(np.ptp(high, axis=0)) > 0.025
+    assert np.nanmax(high[[0, -1]]) < np.nanmax(high) - 0.025  # hems lie
+    sides = level.front[0, [0, -1], 1]
+    assert sides[1] - sides[0] == pytest.approx(0.05, abs=0.03)
+    sunk = (level.front - bent.front)[..., 1]
+    assert np.abs(sunk[:, np.abs(level.front[0, :, 0] + 0.4) < 0.3]).max() < 1e-9
+    assert sunk[:, np.abs(level.front[0, :, 0] - 0.4) < 0.3] == pytest.approx(0.06)

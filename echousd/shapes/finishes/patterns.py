@@ -167,7 +167,7 @@ def knitted(stitches: int = 96) -> Relief:
     u, v = _grid()
     slant = np.abs((u * stitches) % 1.0 - 0.5)
     height = np.abs(np.sin(np.pi * (v * stitches + slant))) * (1 - (2 * slant - 0.5) ** 2)
-    return Relief(1 + 0.32 * (height - height.mean()) + 0.03 * noise(41, 90.0, 90.0), 0.0007 * height + creased())
+    return Relief(1 + 0.16 * (height - height.mean()) + 0.015 * noise(41, 90.0, 90.0), 0.0004 * height + creased())
 
 
 def linen() -> Relief:

@@ -11,10 +11,11 @@ from echomodel.furniture.solids import Solid, rotation, tube, turned
 
 BOUND, TASSEL, APART = 0.014, 0.055, 0.03  # metres of a rug that its edge and tassels take, and between these
 EDGES = {"cloth": "cushion", "cloth2": "drape", "blanket": "velvet", "accent": "accent_plain"}  # by what is woven in
-LIES = (8, 24)  # cells in which a throw knows what it lies on
+LIES = (17, 28)  # rows and columns in which a throw knows what it lies on
 FULL = (0.4, 1.0)  # of the fullest fold at a foot, the others
 BREAK = (0.05, 0.3)  # share of its height over its foot where a curtain breaks, and of a fold that is less deep there
-GATHERED, FRINGE, HEM = 0.028, 0.045, 0.0058  # metres of a throw: of its folds, of threads at its ends, half a hem
+# Metres of a throw: of its folds where it lies and where it hangs, and between them; over an edge, thick.
+GATHERED, PLEATED, FOLDED, OVER_EDGE, THIN = 0.045, 0.022, 0.24, 0.08, 0.006
 BENDS, ROUND = (np.arange(10) + 0.5) * np.pi / 5, 0.075  # where in a fold, radians, points are; wider than a wave there
 DRAPES = ("curtain", "curtain", "linen", "drape", "drape", "velvet", "drape_striped")  # what curtains are of
 THROWS = ("accent_cloth", "accent_cloth", "accent_striped", "accent_checked")
@@ -104,37 +105,35 @@ def cushion(size: Size, rng: np.random.Generator, shown: str = "", lie: tuple[fl
 
 
 def throw(size: Size, rng: np.random.Generator, lie: tuple[float, ...] = ()) -> list[Solid]:
-    """A blanket over the foot of a bed: it lies across, follows what is below down to its edges, and hangs down at both
-    sides by its height, where it ends in fringes.
+    """A blanket over the foot of a bed or an arm: it lies across in a few broad folds, follows what is below point by
+    point, and hangs down at both sides, where its folds run on; its hems are thin.
 
-    `lie`: how far below its top the bed is, metres, in `LIES` cells from the head and from the left.
+    `lie`: how far it hangs down at its left and right, metres, by its height where nothing is told; how far below its
+    top the bed is, in `LIES` rows from the head and columns from the left.
     """
-    (w, h, d), turn = size, np.linspace(0, np.pi / 2, 4)
-    round_off, fringe = 0.05, min(FRINGE, 0.25 * h)
-    flat = w / 2 - round_off
-    corner = np.stack([flat + round_off * np.sin(turn), h - round_off * (1 - np.cos(turn))], 1)
-    hang = np.stack([np.full(3, w / 2), np.linspace(h - round_off, fringe, 4)[1:]], 1)
-    side = np.concatenate([[[share * flat, h] for share in np.linspace(0, 1, 12)[1:-1]], corner, hang])
-    profile = np.concatenate([side[::-1] * (-1, 1), [[0.0, h]], side])
-    share, phase = np.linspace(-1, 1, 2 * LIES[0] - 1), rng.uniform(0, 6, 3)
-    cells, at = np.reshape(lie or np.zeros(LIES), LIES), (np.arange(LIES[1]) + 0.5) / LIES[1] * 2 - 1
-    lower = np.array([np.interp(profile[:, 0] / (w / 2), at, row) for row in cells])
-    lower[1:-1] = (lower[:-2] + 2 * lower[1:-1] + lower[2:]) / 4
-    lower = np.array([np.interp(share, np.linspace(-1, 1, LIES[0]), column) for column in lower.T]).T
-    x, deep = np.meshgrid(profile[:, 0], share * d / 2)
-    hanging, end = np.clip((h - profile[:, 1]) / max(h, 1e-6), 0, 1), np.abs(share[:, None])
-    ripple = 0.018 * (1 + np.sin(2 * np.pi * deep / d * 2.5 + phase[0] + np.sign(x))) * hanging  # away from the bed
-    skew = (0.03 * np.sin(2.2 * x + phase[1]) + 0.09 * (phase[2] / 3 - 1) * x) * (1 - hanging / 2)
-    gathered = (
-        deep * (1 - 0.16 * np.sin(1.4 * x + phase[2]) ** 2) + skew + 0.018 * np.sin(6 * x + phase[1]) * share[:, None]
-    )
-    fold = 12 * deep + 1.6 * np.sin(2.1 * x + phase[0]) + 0.7 * np.sin(5.3 * x + phase[2]) + phase[1]
-    # along its rows it lies in folds, and its hems on what is below
-    lower = lower + min(1.0, w) * GATHERED * np.maximum(np.abs(np.sin(fold)) ** 3, 0.9 * end**5)
-    front = np.stack([x + np.sign(x) * ripple, profile[:, 1] - lower * (1 - hanging), gathered], -1)
-    under = 0.009 * (1 - 0.8 * end**6)  # thin at its hems
-    back = front - np.stack([np.sign(x) * under * (hanging > 0), under * (hanging < 0.5), 0 * x], -1)
-    material, knots = str(rng.choice(THROWS)), np.concatenate([front[:, 0], front[:, -1]])
-    ends = [tube([knot, knot - (0, fringe * rng.uniform(0.7, 1.0), 0)], 0.004, material) for knot in knots]
-    hems = [tube((over + below) / 2, HEM, "linen") for over, below in zip(front[[0, -1]], back[[0, -1]], strict=True)]
-    return [Sheet(front=front, back=back, material=material), *hems, *ends]
+    (w, h, d), turn, (left, right, *lower_by) = size, np.linspace(0, np.pi / 2, 4), lie or (size[1], size[1])
+    bend, x1 = min(OVER_EDGE, 0.1 * w), w / 2 - 1.3 * PLEATED
+    edge = np.stack([x1 - bend * (1 - np.sin(turn)), bend * (1 - np.cos(turn))], 1)
+    one, other = (np.concatenate([edge, np.linspace((x1, bend), (x1, fall), 4)[1:]]) for fall in (left, right))
+    top = np.linspace((bend - x1, 0), (x1 - bend, 0), LIES[1] - 2)[1:-1]
+    across, drop = np.concatenate([one[::-1] * (-1, 1), top, other]).T
+    share, phase = np.linspace(-1, 1, LIES[0]), rng.uniform(0, 2 * np.pi, 4)
+    x, z = np.meshgrid(across, share * d / 2)
+    end, steep = np.abs(share[:, None]), np.clip(drop / bend, 0, 1)  # of its way around the edge
+    hung = drop / np.where(across < 0, left, right)
+    cells, at = np.reshape(lower_by or np.zeros(LIES), LIES), (np.arange(LIES[1]) + 0.5) / LIES[1] * 2 - 1
+    lower = np.array([np.interp(across / (w / 2), at, row) for row in cells])
+    # broad folds that run across, wander, swell and fade, and none along its hems
+    way = d / FOLDED * np.pi * (share[:, None] + 0.25 * np.sin(1.9 * x + phase[0]) + 0.1 * np.sin(4.7 * x + phase[1]))
+    swell = 0.65 + 0.35 * np.sin(2.3 * x + 2.6 * share[:, None] + phase[2])
+    fold = (0.5 + 0.5 * np.cos(way + phase[3])) ** 4 * swell * (1 - end**4)
+    fold, high = fold / fold.max(), min(1.0, w) * GATHERED
+    out = (fold * np.sqrt(hung) + 0.3 * hung) * PLEATED
+    skew = (0.03 * np.sin(2.2 * x + phase[1]) + 0.06 * (phase[2] / np.pi - 1) * x) * (1 - hung / 2)
+    along = z * (1 - 0.12 * np.sin(1.4 * x + phase[2]) ** 2) * (1 - 0.07 * hung) + skew
+    short = 0.012 * (1 + np.sin(2.8 * share[:, None] + phase[0])) * hung
+    y = h - np.maximum(drop, lower) - (1 - fold) * high * (1 - steep) + short
+    front = np.stack([x + np.sign(x) * out, y, along + 0.012 * np.sin(6 * x + phase[1]) * share[:, None]], -1)
+    under = THIN * (1 - 0.6 * end**6)
+    back = front - np.stack([np.sign(x) * under * steep, under * (1 - steep), 0 * x], -1)
+    return [Sheet(front=front, back=back, material=str(rng.choice(THROWS)))]
