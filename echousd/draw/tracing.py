@@ -25,8 +25,7 @@ PLACES, OFTEN, TURNS = (600, 1200), 3, 5
 # Metres from which on what stands near throws on all of its light, which is in a shadow itself, and of how much it
 # throws on more if it is white; what any surface mirrors of all around it.
 CREVICE, PALE, SHEEN = 1.0, 0.55, 0.05
-# As photographers of rooms throw light at ceilings: its share of the mean in the room, and metres below them that it
-# reaches; else they are grey, as lamps and windows shine downwards.
+# Light at ceilings, which photographers of rooms throw: its share of the mean, and metres below them that it reaches.
 THROWN, UPPERMOST = np.float32(0.25), 0.35
 # In fine pictures: metres within which what is met throws on what falls just there; factors that make of a place of the
 # unit square others that hardly depend on it, for the rays from there; share of the width on either side of an edge in
@@ -52,8 +51,7 @@ def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: in
     gives the same picture.
     """
     height = round(size / view.aspect)
-    shift = np.random.default_rng(seed).random(4)
-    sun = scenery.lights.sun
+    shift, sun = np.random.default_rng(seed).random(4), scenery.lights.sun
     sun = np.float32(SUN / np.pi) * (0 * SUN_LIGHT if sun is None else sun[1]) if view.inside else 0.55 * SUN_LIGHT
     dark = Bounced.dark(*scenery.bounds)
     world = World(embree(scenery.triangles), scenery, view, size, shift, dark, sun, rays >= FINE)
@@ -114,9 +112,9 @@ BEFORE, THICK = np.float32(2e-3), np.float32(0.016)
 # Of thin cloth before a pane: metres behind it where one begins to see, the share of what is there, the power of the
 # cosine by which that is less aside; how bright bars of the window are before the light.
 BEHIND, SEEN_BY, CLOSER, BAR = 0.05, 0.42, 6, 0.45
-MIRROR = 0.8  # gloss of what mirrors like glass with silver behind it
-# Of glass that one looks through: sheets at most, its colour, how bright is what it mirrors from aside and more of what
-# is above, the share of that straight on, aslant it is more; by which shares differ where an edge of it is.
+MIRROR, DYED = 0.8, 0.4  # gloss of what mirrors like glass with silver behind it; by the square of how coloured it is
+# Of glass that one looks through: sheets at most, its colour, how bright is what it mirrors aside and more of what is
+# above, the share of that straight on, aslant it is more; by which shares differ at an edge; more if it is coloured.
 SHEETS, TINT, MIRRORED, CLEAR, EDGE = 12, np.array([[0.84], [0.94], [0.92]], "f4"), (0.32, 0.58), 0.04, 0.12
 
 
@@ -143,14 +141,18 @@ def _met(world: World, pixel: np.ndarray, place: np.ndarray, first: Seen | None 
             if not len(some):
                 continue
             on, normal = way.take(some, 1), part.normal.take(some, 1)
-            on = on if glass else on - 2 * along(on, normal) * normal
+            facing = along(on, normal)
+            if glass:
+                tint = world.scenery.flat_colors.take(part.face.take(some), 0).T
+                tint /= np.maximum(tint.max(0), np.float32(1e-6))
+                above = np.clip(on[1] - 2 * facing * normal[1], 0, 1)
+                color = np.insert(TINT * tint * (MIRRORED[0] + MIRRORED[1] * above), 3, 1, axis=0)
+                share = CLEAR + DYED * (1 - tint.min(0)) ** 2
+                veil[:, some] += (1 - veil[3, some]) * (share + (1 - share) * (1 + facing) ** 3) * color
+            on = on if glass else on - 2 * facing * normal
             origin = part.point.take(some, 1) + BEFORE * (on if glass else normal)
             for own, other in zip(part, _seen(world, origin, on, first_hit(world, origin, on)), strict=True):
                 own[..., some] = other
-            if glass:
-                above = np.clip(on[1] - 2 * (facing := along(on, normal)) * normal[1], 0, 1)
-                color = np.insert(TINT * (MIRRORED[0] + MIRRORED[1] * above), 3, 1, axis=0)
-                veil[:, some] += (1 - veil[3, some]) * (CLEAR + (1 - CLEAR) * (1 + facing) ** 3) * color
         some = np.flatnonzero(veil[3])
         veil, behind = veil[:, some], (1 - veil[3, some]) * part.shown[some]
         part.shown[some] = veil[3] + behind
@@ -402,9 +404,8 @@ def _mirrored(world: World, seen: Seen, square: np.ndarray) -> np.ndarray:
     bright = np.flatnonzero(scenery.planes.glows.take(face))
     lamps = (scenery.emissive.take(face[bright], 0) * world.glow) @ LUMA
     within[bright] += np.minimum(lamps, np.float32(GLINT) * (world.white @ LUMA))
-    sky = LUMA @ scenery.lights.from_sky(way)
     share = np.where(gloss > METAL, 1, 0.04 + (0.96 - rough) * (1 - facing) ** 5)  # Schlick's, of Fresnel's law
-    out[some] = share * np.where(face < 0, sky, within)
+    out[some] = share * np.where(face < 0, LUMA @ scenery.lights.from_sky(way), within)
     return out
 
 

@@ -1,11 +1,11 @@
-"""The coarse table of a room's light: what surfaces throw on to one another, by place and side; light at ceilings."""
+"""The coarse table of a room's light, by place and side; light thrown at ceilings; coloured glass."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
-from box_room import LAMP, box_room
+from box_room import LAMP, box_room, level_sheet, with_sheet
 
 from echousd.draw import tracing
 from echousd.draw.indoors import Bounced
@@ -57,3 +57,16 @@ def test_light_is_thrown_at_the_ceiling_and_at_nothing_below_it(monkeypatch):
     (floor, dark), (same, bright) = pictures
     assert same == floor
     assert 1.02 < bright / dark < 1.6
+
+
+def test_coloured_glass_shows_its_colour_and_clear_glass_what_is_behind_it():
+    bare, down = box_room(sky=1.0, **LAMP)
+    clear, blue = (
+        with_sheet(bare, level_sheet(0.8, 0.8, 1.0), thin=np.ones(2), flat_colors=np.tile(color, (2, 1)))
+        for color in ((0.9, 0.9, 0.9), (0.05, 0.2, 0.6))
+    )
+    red, same = (
+        [tracing.trace(one, down, 32, rays=2)[8:12, 14:18, c].mean() for one in (bare, clear, blue)] for c in (0, 2)
+    )
+    assert abs(red[1] - red[0]) < 0.1
+    assert red[2] / same[2] < 0.93 * red[1] / same[1]
