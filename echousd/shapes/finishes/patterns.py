@@ -26,7 +26,7 @@ class Relief:
     rough: np.ndarray | None = None  # (SIZE, SIZE) float, added to the roughness, None where it is even
 
 
-@lru_cache(maxsize=8)  # those of wear and of piles are asked for again by image after image
+@lru_cache(maxsize=20)  # those of wear, paint and piles are asked for by image after image
 def noise(seed: int, along: float, across: float, power: float = 2.0) -> np.ndarray:
     """(SIZE, SIZE) periodic noise of deviation 1; features are about `SIZE / along` x `SIZE / across` pixels."""
     rng = np.random.default_rng(seed)

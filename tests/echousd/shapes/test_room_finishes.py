@@ -55,6 +55,16 @@ def test_images_hold_the_colour_that_was_asked_for():
     assert baking.normal_image("leaf", 0.3) is None
 
 
+def test_noise_that_images_share_is_made_once():
+    kinds = {row.get("kind"): name for name, row in PRINTS.items() if row.get("kind") and "cloud" not in str(row)}
+    for missed in (None, 0):
+        before = noise.cache_info().misses
+        for name in ("wood", "rumpled", *kinds.values(), next(name for name in PRINTS if "cushion_" in name)):
+            pictures.color_image(name, (0.5, 0.4, 0.3), "oak", 0.1)
+        assert missed is None or noise.cache_info().misses - before == missed
+    assert len(kinds) >= 5
+
+
 def test_every_slot_has_a_look_in_every_harmony():
     assert len(HARMONIES) >= 20
     for harmony in HARMONIES:
