@@ -26,7 +26,7 @@ def worked(image: Image.Image, paper: tuple[int, int, int], medium: tuple[float,
 
     wet, brush = medium
     small = image.resize((SIZE, SIZE), Image.Resampling.BOX)
-    soft = small.filter(ImageFilter.GaussianBlur(AROUND * SIZE))
+    soft = small.reduce(4).filter(ImageFilter.GaussianBlur(AROUND * SIZE / 4)).resize(small.size)
     # no edge is straight: places are moved
     moved = [field(number, 14.0, 14.0, 4.0) * (0.0025 * wet + 0.0015 * brush) * SIZE for number in (0, 1)]
     places = zip(np.indices((SIZE, SIZE)), moved, strict=True)

@@ -22,7 +22,7 @@ STOCK = {"paper": "f4efe6", "ink": "2d3136"}  # colours that no harmony changes
 # Patterns of wood; the shares of its red that green and blue of no wood are over: what is of another colour is painted,
 # and so much of the grain is seen through it.
 GRAINED, LIKE_WOOD, UNDER_PAINT = ("wood", "veneer"), (0.85, 0.58), 0.2
-QUALITY = 86  # of JPEG; without subsampling, because normals live in the colours
+QUALITY = 86  # of JPEG, its hues `halved`: at half the places, which nobody sees; normals live in theirs
 Row = Mapping[str, Any]
 
 
@@ -212,13 +212,13 @@ def printed(name: str, harmony: str) -> np.ndarray:
 def color_image(pattern: str, color: Color, harmony: str, worn: float = 0.0) -> bytes:
     """A pattern in a colour (linear RGB), `aged` by a share, or what is printed in those of a harmony, as JPEG."""
     if pattern in PRINTS:
-        return _encoded(from_linear(printed(pattern, harmony)), QUALITY)
+        return _encoded(from_linear(printed(pattern, harmony)), QUALITY, halved=True)
     tone = relief(pattern).tone
     if pattern in GRAINED and not (color[1] < LIKE_WOOD[0] * color[0] and color[2] < LIKE_WOOD[1] * color[0]):
         tone, worn = 1 + UNDER_PAINT * (tone - 1), UNDER_PAINT * worn
     tone = aged(tone, worn) if worn else tone
     tone = tone[..., None] if tone.ndim == 2 else tone
-    return _encoded(from_linear(np.clip(tone * np.asarray(color), 0, 1)), QUALITY)
+    return _encoded(from_linear(np.clip(tone * np.asarray(color), 0, 1)), QUALITY, halved=True)
 
 
 def normal_image(pattern: str, metres: float) -> bytes | None:
@@ -241,8 +241,8 @@ def rough_image(pattern: str, roughness: float) -> bytes | None:
     return None if rough is None else _encoded(np.clip(roughness + rough, 0.05, 1), 70)
 
 
-def _encoded(value: np.ndarray, quality: int) -> bytes:
+def _encoded(value: np.ndarray, quality: int, *, halved: bool = False) -> bytes:
     out = io.BytesIO()
     pixels = (np.clip(value, 0, 1) * 255 + 0.5).astype(np.uint8)
-    Image.fromarray(pixels).save(out, "JPEG", quality=quality, subsampling=0)
+    Image.fromarray(pixels).save(out, "JPEG", quality=quality, subsampling=2 * halved, optimize=True)
     return out.getvalue()

@@ -55,6 +55,16 @@ def test_images_hold_the_colour_that_was_asked_for():
     assert baking.normal_image("leaf", 0.3) is None
 
 
+def test_images_are_small_and_keep_normals_whole():
+    """Pixels are coded by what is in them; hues at half the places, where they are no normals."""
+    for image, places in ((pictures.color_image("wood", (0.5, 0.4, 0.3), "oak"), 2),
+                          (pictures.normal_image("linen", 0.9), 1)):  # fmt: skip
+        read, plain = Image.open(io.BytesIO(image)), io.BytesIO()
+        assert [layer[1:3] for layer in read.layer] == [(places, places), (1, 1), (1, 1)]
+        read.save(plain, "JPEG", qtables=read.quantization, subsampling=2 * (places > 1))
+        assert len(image) < 0.95 * len(plain.getvalue())
+
+
 def test_noise_that_images_share_is_made_once():
     kinds = {row.get("kind"): name for name, row in PRINTS.items() if row.get("kind") and "cloud" not in str(row)}
     for missed in (None, 0):
