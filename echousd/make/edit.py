@@ -258,7 +258,8 @@ def restyled(saved: SavedRoom, graph: SceneGraph, fresh: Collection[str]) -> set
 def touched(before: SceneGraph, after: SceneGraph, boxes: Boxes | None = None) -> tuple[set[str], set[str]]:
     """Names of objects that need a box and a shape, and of objects that only need another place.
 
-    `boxes`: of `before`, which tell who attends what is placed anew; who attends what is put somewhere is `carried`.
+    `boxes`: of `before`, which tell who attends what is placed anew, and stood on what is gone; who attends what is put
+    somewhere is `carried`.
     """
     diff = before.diff(after)
     fresh = {node.name for node in diff.added}
@@ -266,9 +267,12 @@ def touched(before: SceneGraph, after: SceneGraph, boxes: Boxes | None = None) -
     moving = {relation.subject for relation in diff.related}
     moving |= {new.name for old, new in diff.changed if placed_at(old) != placed_at(new)}
     on = [(r.subject, r.object) for r in after.relations if vocabulary().predicate(r.predicate).follows]
-    pairs = [] if boxes is None else attending(plan_to_live_in(before, boxes))
-    by = [(before.names[k], before.names[i]) for k, i in pairs]
-    free = movable(after)
+    free, by = movable(after), list[tuple[str, str]]()
+    if boxes is not None:
+        room, names = plan_to_live_in(before, boxes), before.names
+        by = [(names[k], names[i]) for k, i in attending(room)]
+        gone = {node.name for node in diff.removed}
+        moving |= {names[k] for k, i in enumerate(room.carrier.tolist()) if i >= 0 and names[i] in gone} & free
     for _ in (*on, *by):  # what stands on something goes with it, and what stands on that
         moving |= {subject for subject, carrier in on if carrier in fresh | moving & free} & free
         moving |= {guest for guest, host in by if host in moving & free} & free

@@ -95,6 +95,24 @@ def test_company_of_what_is_placed_anew_is_placed_anew():
     assert touched(before, after) == (set(), {"table", "light"})
 
 
+def test_what_stood_on_something_that_is_gone_is_placed_anew():
+    before = room()
+    assert touched(before, before.remove_node("table"), boxes()) == (set(), {"light"})
+    assert touched(before, before.lock("light").remove_node("table"), boxes()) == (set(), set())
+
+
+def test_a_lamp_whose_table_goes_finds_another(tmp_path):
+    graph = SceneGraph(
+        RoomSpec("bedroom", size=(4.4, 3.8), height=2.6),
+        (Node("bed", "double_bed"), Node("left", "nightstand"), Node("right", "nightstand"), Node("lamp", "table_lamp")),
+        (Relation("lamp", "standing_on", "left"),),
+    )
+    made = echousd.generate(graph, seed=4, shapes="boxes", walls=False, dress="none", preview=False)
+    root = made.save(tmp_path / "room")
+    edit(root, remove="left").save(tmp_path / "room")
+    assert not echousd.check(root).placement
+
+
 @pytest.fixture
 def saved(tmp_path):
     graph = SceneGraph(
