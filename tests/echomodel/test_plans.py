@@ -81,6 +81,12 @@ def test_halls_get_more_openings_and_cupboards_none() -> None:
     assert place_openings(rectangle(0.8, 0.8), 2.6, rng) == ()
 
 
+def test_a_room_too_low_for_an_opening_gets_none() -> None:
+    polygon = rectangle(4.0, 3.0)
+    assert {one.kind for one in place_openings(polygon, 1.0, np.random.default_rng(1))} == {"door"}
+    assert place_openings(polygon, 0.05, np.random.default_rng(1)) == ()
+
+
 def test_a_door_swings_out_of_a_room_that_leaves_its_leaf_no_place() -> None:
     floor = rectangle(3.0, 3.0)
     block = (np.array([[1.4, 1.0, 1.4]]), np.zeros((1, 3)), np.zeros(1))  # 0.8 m all around

@@ -14,7 +14,7 @@ CORNER = 0.1  # metres from a corner to a door
 OUTWARDS = 0.7  # what a door that swings out of the room must save; rooms' doors open inwards
 PIER = 0.3  # metres of wall between a window and a corner or another opening
 SECOND_WINDOW, SECOND_DOOR = 16.0, 30.0  # square metres of floor
-NARROWEST, SLIGHT = 0.5, 0.4  # metres, of a window; what one costs that is half as wide as usual
+NARROWEST, SLIGHT = 0.5, 0.4  # metres, of a window, and as low; what one costs that is half as wide as usual
 
 
 def place_openings(
@@ -50,11 +50,13 @@ def _best(
     boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None, use: str,
     spans: Sequence[tuple[int, float, float]] | None,
 ) -> Opening | None:  # fmt: skip
-    """The place of least cost among a grid of places on all walls, or some spans; None where nothing is long enough."""
+    """The place of least cost among a grid of places on all walls, or some spans; None where nothing is long or high enough."""
     lengths, spare = edge_lengths(polygon), spans is not None and any(one.kind == kind for one in made)
     name = numbered(kind, [opening.name for opening in made])
     sill, tall, wide = WINDOWS[use] if kind == "window" else (0.0, USUAL[kind]["height"], USUAL[kind]["width"])
     tall = min(tall, height - sill - 0.05)
+    if tall < NARROWEST:
+        return None
     doors = [opening for opening in made if opening.kind == "door"]
     turned = signed_area(polygon) > 0
     places: list[tuple[int, float, float, str, str]] = []  # edge, offset, width, hinge and swing
