@@ -1,5 +1,6 @@
 """Where objects stand, inside the floor and on something, and which of their meshes run into each other."""
 
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -101,8 +102,10 @@ class Carriers(tuple[Shape, ...]):
 
 
 def find_misplaced(whole: Whole) -> tuple[Misplacement, ...]:
-    """All that stands, hangs or looks where it should not; nothing in a room without furniture."""
+    """All that stands, hangs or looks where it should not; nothing in a room without furniture, of which it warns."""
     if not whole.room.objects:
+        if whole.room.missing:
+            warnings.warn(f"<{whole.room.path}>: no object has geometry yet; its graph alone is checked", stacklevel=2)
         return ()
     return (*_furniture(whole), *_screens(whole), *_dressing(whole))
 

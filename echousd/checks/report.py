@@ -134,7 +134,7 @@ def _site(error: Any) -> str:
 
 
 def verdicts_of(room: RoomContents, rules: str = "strict") -> tuple[Verdict, ...]:
-    """What became of every relation and placement of objects with boxes; raises ValueError for unknown rules."""
+    """What became of every relation, and of placements of objects with boxes; raises ValueError for unknown rules."""
     from echousd.make.verdicts import relation_verdicts
 
     here = {thing.name for thing in room.objects}
@@ -144,7 +144,8 @@ def verdicts_of(room: RoomContents, rules: str = "strict") -> tuple[Verdict, ...
     ]
     spec = room.spec or RoomSpec(UNTOLD)  # what contradicts itself in it is told by others
     graph = SceneGraph.model_construct(room=spec, nodes=tuple(nodes), relations=room.relations)
-    return relation_verdicts(graph, _boxes(room), rules=rules)
+    unmeasured = (Verdict(*relation.triple, "unmeasured") for relation in room.unmeasured)
+    return (*relation_verdicts(graph, _boxes(room), rules=rules), *unmeasured)
 
 
 @dataclass(frozen=True)
@@ -153,7 +154,7 @@ class LayoutReport:
 
     Arguments:
         name: of the variant, "" where the room has only one layout.
-        relations: every relation and placement of objects with boxes, with its verdict and margin.
+        relations: every relation, and placements of objects with boxes, with verdict and margin.
         collisions, placement: what stands where it should not.
         living: what a person would point at though the graph does not forbid it; warnings.
     """
@@ -267,7 +268,9 @@ def check(
     found = [check_layout(Reading(stage) if name else reading, name, rules) for name in each_layout(stage, layout)]
     rooms = found[0][0]
     if not rooms and not errors:
-        raise StageError(f"{source(stage)}: no room (no EchoSceneGraph prim), nothing to check")
+        raise StageError(
+            f"{source(stage)}: no room (no EchoSceneGraph prim), nothing to check; echousd adopt makes one"
+        )
     first = found[0][1]
     if len(rooms) == 1 and first.name in ("", "layout_0"):
         errors = (*errors, *rewritten(stage, rooms[0], first.relations))

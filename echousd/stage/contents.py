@@ -105,7 +105,7 @@ class RoomContents:
         path: prim path of the room.
         spec: room type, floor and height, or None where they cannot be read.
         objects: the objects that have a box; missing: names of those that have neither geometry nor a fixed box.
-        relations: the relations whose two ends are among the objects.
+        relations: the relations whose two ends are among the objects; unmeasured: those that have a missing end.
     """
 
     path: str
@@ -113,6 +113,7 @@ class RoomContents:
     objects: tuple[RoomObject, ...]
     missing: tuple[str, ...]
     relations: tuple[Relation, ...]
+    unmeasured: tuple[Relation, ...] = ()
 
 
 def read_contents(prims: RoomPrims) -> RoomContents:
@@ -134,11 +135,12 @@ def read_contents(prims: RoomPrims) -> RoomContents:
             objects.append(found)
     present = {thing.node.name for thing in objects}
     read = [readable(partial(relation_of, prim, names), None) for prim in prims.relations]
-    relations = tuple(r for r in read if r is not None and r.subject in present and r.object in present)
+    stated = {relation.triple: relation for relation in read if relation is not None}.values()
+    between = tuple(each for each in stated if {each.subject, each.object} <= present)
     spec = readable(lambda: room_spec(prims), None)
     assert stage
-    relations = tuple({relation.triple: relation for relation in relations}.values())
-    return RoomContents(str(prims.room.GetPath()), spec, tuple(objects), tuple(missing), relations)
+    nowhere = tuple(each for each in stated if each not in between)
+    return RoomContents(str(prims.room.GetPath()), spec, tuple(objects), tuple(missing), between, nowhere)
 
 
 def readable_names(prims: RoomPrims) -> dict[Sdf.Path, str]:

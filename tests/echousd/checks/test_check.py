@@ -288,6 +288,20 @@ def test_bad_input(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert "no room (no EchoSceneGraph prim), nothing to check" in capsys.readouterr().err
 
 
+def test_relations_of_what_has_no_geometry_are_not_measured(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    graph = SceneGraph(RoomSpec("study", size=(3.0, 3.0)), (Node("desk", "desk"), Node("chair", "office_chair")))
+    echousd.write_graph(graph.relate("chair", "close_by", "desk"), tmp_path / "asked.usda")
+    with pytest.warns(UserWarning, match="^</Room>: no object has geometry yet; its graph alone is checked$"):
+        assert run(["check", str(tmp_path / "asked.usda")]) == 0
+    assert "0 of 0 kept, 1 not measured" in capsys.readouterr().out
+    room = echousd.generate(graph.relate("chair", "close_by", "desk"), shapes="boxes", dress="none", preview=False)
+    stage = Usd.Stage.Open(str(room.save(tmp_path / "room")))
+    stage.GetPrimAtPath("/Room/Objects/chair/geo").SetActive(False)
+    report = check(stage)
+    assert [(one.sentence, one.state) for one in report.relations] == [("chair close_by desk", "unmeasured")]
+    assert [(one.object, one.problem) for one in report.placement] == [("chair", "empty")]
+
+
 def test_living_rules_are_warnings_unless_strict(capsys: pytest.CaptureFixture[str]) -> None:
     contents = RoomContents(
         "/Room",

@@ -104,7 +104,12 @@ def test_what_stood_on_something_that_is_gone_is_placed_anew():
 def test_a_lamp_whose_table_goes_finds_another(tmp_path):
     graph = SceneGraph(
         RoomSpec("bedroom", size=(4.4, 3.8), height=2.6),
-        (Node("bed", "double_bed"), Node("left", "nightstand"), Node("right", "nightstand"), Node("lamp", "table_lamp")),
+        (
+            Node("bed", "double_bed"),
+            Node("left", "nightstand"),
+            Node("right", "nightstand"),
+            Node("lamp", "table_lamp"),
+        ),
         (Relation("lamp", "standing_on", "left"),),
     )
     made = echousd.generate(graph, seed=4, shapes="boxes", walls=False, dress="none", preview=False)
