@@ -14,7 +14,7 @@ from echomodel.late import Late
 from echomodel.objective import TERMS
 from echomodel.objective.plan import kind_of
 from echomodel.objective.sizes import fitting_loads, hung_lamps, in_proportion, laid_tables, smaller_sizes, usual_sizes
-from echomodel.objective.support import ON_FLOOR
+from echomodel.objective.support import FREE, ON_FLOOR, stacked
 from echomodel.openings import Opening, signed_area
 from echomodel.rules import margins, verdicts
 from echomodel.rules.geometry import Spread
@@ -23,7 +23,7 @@ from echousd.graph import SceneGraph
 from echousd.graph.arrays import stated_placements, triplets_of
 from echousd.place.distances import BED_LIT
 from echousd.place.geometry import collisions, outside
-from echousd.place.problem import Problem, problem_of, stacked
+from echousd.place.problem import Problem, problem_of
 from echousd.place.search import Arranged, Search
 from echousd.place.solver import PlaceConfig, solve, unmet
 
@@ -191,7 +191,7 @@ def place_boxes(
     # The supports are met to a fraction of a millimetre; put them exactly, ceiling things as the solver left them.
     hung = lamps_along(categories, at.position, found.position, triplets, held) if at is not drawn else found.position
     size_end = in_proportion(at.categories, found.size, ~rigid)
-    end = stacked(size_end, hung, at.carrier, None, held)
+    end = stacked(size_end, hung, np.where(held, FREE, at.carrier), np.nan)
     ceiling = np.inf if height is None else np.maximum(height - size_end[:, 1], 0.0)
     end[~held, 1] = np.clip(end[:, 1], 0.0, ceiling)[~held]  # whatever is told of a lamp, it stays in the room
     written = Spread(*(of.astype(np.float32) for of in (size_end, end, turn)))

@@ -10,7 +10,7 @@ import numpy as np
 from echomodel.boxes2d import axes, footprints, seen
 from echomodel.graph import Stated
 from echomodel.objective import Plan, plan_of
-from echomodel.objective.support import ON_CEILING, ON_FLOOR, carriers
+from echomodel.objective.support import FREE, ON_FLOOR, carriers, stacked
 from echomodel.openings import Opening
 from echomodel.rules import measured
 from echomodel.rules.geometry import Spread
@@ -164,7 +164,8 @@ def problem_of(
     rows = np.flatnonzero(np.isin(triplets[:, 1], sorted(measured(rules))))
     floor = None if floor_polygon is None else Floor(floor_polygon)
     carrier = carriers([vocabulary().category(word) for word in words], size, position, yaw, triplets)
-    position, yaw = stacked(size, position, carrier, height, fixed), yaw.copy()
+    ceiling, yaw = np.nan if height is None else height, yaw.copy()
+    position = stacked(size, position, np.where(fixed, FREE, carrier), ceiling)
     wall = np.full((len(words), 2, 2), np.nan)
     if floor is not None:
         backed = {one.subject for one in stated if one.placement == "against_wall"}
@@ -184,19 +185,6 @@ def wall_gaps(wall: np.ndarray, size: np.ndarray, position: np.ndarray, yaw: np.
     normal = wall[:, 1]
     reach = (np.abs(seen(normal, yaw)) * size[:, [0, 2]]).sum(-1) / 2
     return ((position[:, [0, 2]] - wall[:, 0]) * normal).sum(-1) - reach
-
-
-def stacked(
-    size: np.ndarray, position: np.ndarray, carrier: np.ndarray, height: float | None, fixed: np.ndarray
-) -> np.ndarray:
-    """(n, 3) float: positions with each bottom on the floor or its carrier's top, and ceiling things at the ceiling."""
-    out, tall = position.copy(), size[:, 1]
-    hung = position[:, 1] if height is None else height - tall
-    out[:, 1] = np.where(carrier == ON_FLOOR, 0.0, np.where(carrier == ON_CEILING, hung, position[:, 1]))
-    out[fixed, 1] = position[fixed, 1]
-    for _ in range(len(size)):  # at most so many stand on one another
-        out[:, 1] = np.where((carrier >= 0) & ~fixed, (out[:, 1] + tall)[np.maximum(carrier, 0)], out[:, 1])
-    return out
 
 
 def lean(

@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, cast, device_of, full, kit, on_device
+from echomodel.arrays import Array, cast, device_of, full, kit, on_device
 from echomodel.boxes import Boxes
 from echomodel.graph import GraphBatch, Stated
 from echomodel.objective import Plan
 from echomodel.objective.access import askew
-from echomodel.objective.support import ON_CEILING, ON_FLOOR
+from echomodel.objective.support import FREE, stacked
 from echomodel.openings import HINGES, STEP, Opening, inward_normal
 from echomodel.vocabulary import vocabulary
 
@@ -36,27 +36,13 @@ def standing(plan: Plan, boxes: Boxes, fixed: Array | None) -> Plan:
     size, position, yaw = (cast(of, like) for of in (drawn.size, drawn.position, drawn.yaw))
     stays = xp.zeros(len(boxes), dtype=xp.bool) if fixed is None else on_device(fixed, device)
     start = replace(plan, size=size, position=position, yaw=yaw, fixed=stays, floor=cast(plan.floor, like))
-    height = xp.where(stays, position[:, 1], heights(start))
-    return start.at(xp.stack([position[:, 0], height, position[:, 2]], 1), yaw)
+    return start.at(stacked(size, position, xp.where(stays, FREE, start.carrier), start.ceiling), yaw)
 
 
 def placed(boxes: Boxes, position: Array, yaw: Array) -> Boxes:
     """Boxes (N) in other places, in the library, type and place of theirs."""
     drawn = boxes.to(device_of(yaw))
     return Boxes(drawn.size, cast(position, drawn.size), cast(yaw, drawn.size)).to(device_of(boxes.yaw))
-
-
-def heights(plan: Plan) -> Array:
-    """(N,) metres: the bottoms of boxes on the floor, on what carries them or at the ceiling, else where they are."""
-    xp, out, carrier, high = kit(plan.yaw), plan.position[:, 1], plan.carrier, plan.size[:, 1]
-    out = xp.where(carrier == ON_FLOOR, 0.0, out)
-    out = xp.where((carrier == ON_CEILING) & xp.isfinite(plan.ceiling), plan.ceiling - high, out)
-    for _ in range(len(out)):
-        on = xp.where(carrier >= 0, (out + high)[at_least(carrier, 0)], out)
-        if (on == out).all():
-            break
-        out = on
-    return out
 
 
 def plan_of_graph(graph: GraphBatch, rules: str) -> Plan:

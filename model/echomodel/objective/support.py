@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from echomodel.arrays import Array, at_least, kit
 from echomodel.boxes2d import seen
 from echomodel.vocabulary import Category, vocabulary
 
@@ -52,6 +53,22 @@ def _reaches(carrier: np.ndarray, start: int, goal: int) -> bool:
             return True
         start = int(carrier[start])
     return False
+
+
+def stacked(size: Array, position: Array, carrier: Array, ceiling: Array | float) -> Array:
+    """(n, 3) positions with the bottoms on the floor, on what carries them or at the ceiling, else where they are.
+
+    `carrier`: (n,) int, of `carriers`. `ceiling`: metres, NaN = unknown.
+    """
+    xp, high, out = kit(position), size[:, 1], position[:, 1]
+    out = xp.where(carrier == ON_FLOOR, 0.0, out)
+    out = xp.where((carrier == ON_CEILING) & xp.isfinite(ceiling), ceiling - high, out)
+    for _ in range(len(out)):  # at most so many stand on one another
+        on = xp.where(carrier >= 0, (out + high)[at_least(carrier, 0)], out)
+        if (on == out).all():
+            break
+        out = on
+    return xp.stack([position[:, 0], out, position[:, 2]], 1)
 
 
 def shared_fraction(first: Category, second: Category) -> tuple[float, int]:

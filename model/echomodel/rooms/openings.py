@@ -50,7 +50,7 @@ def _best(
     boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None, use: str,
     spans: Sequence[tuple[int, float, float]] | None,
 ) -> Opening | None:  # fmt: skip
-    """The place of least cost among a grid of places on all walls, or some spans; None where nothing is long or high enough."""
+    """The place of least cost among a grid of places on walls, or some spans; None where no wall is large enough."""
     lengths, spare = edge_lengths(polygon), spans is not None and any(one.kind == kind for one in made)
     name = numbered(kind, [opening.name for opening in made])
     sill, tall, wide = WINDOWS[use] if kind == "window" else (0.0, USUAL[kind]["height"], USUAL[kind]["width"])

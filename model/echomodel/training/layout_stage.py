@@ -21,12 +21,11 @@ from echomodel.compact.learned import places
 from echomodel.compact.model import CompactModel
 from echomodel.compact.sampling import box_scale, layout_predictor
 from echomodel.objective import BY_EYE, TERMS, Plan, faults_of
-from echomodel.objective.support import FREE, ON_CEILING, ON_FLOOR
+from echomodel.objective.support import FREE, ON_CEILING, ON_FLOOR, stacked
 from echomodel.randomness import normal
 from echomodel.rules import verdicts
 from echomodel.samplers import sample
 from echomodel.sizes import Z95
-from echomodel.standing import heights
 from echomodel.training.layout_losses import (
     deep,
     layout_loss,
@@ -165,7 +164,7 @@ def drawn_loss(model: CompactModel, batch: LayoutBatch, generator: torch.Generat
     with drawn.yaw.device:  # where the plan makes its numbers
         plan = plan_of_batch(batch, drawn, free)
         vars(plan)["carrier"] = carrier_of(batch)
-        plan = plan.at(torch.stack([plan.position[:, 0], heights(plan), plan.position[:, 2]], 1), plan.yaw)
+        plan = plan.at(stacked(plan.size, plan.position, plan.carrier, plan.ceiling), plan.yaw)
         terms = missed_terms(plan)
         boxes, level = Boxes(plan.size, plan.position, plan.yaw), torch.zeros_like(plan.yaw)
         physics = physics_loss(batch, boxes, level, free, asked=ASKED)
