@@ -41,9 +41,8 @@ def index(
     if len(done.faults) > SHOWN:
         lines.append(f"left out {len(done.faults) - SHOWN} more: echousd assets review {output}")
     lines.append(f"index    {output}: {done.models} models, {done.usable} usable, {done.read} read")
-    for folder in folders:
-        if not folder.resolve().is_relative_to(output.resolve().parent):
-            lines.append(f"note     {folder} is not below the index: generate asks for --allow-outside {folder}")
+    far = (folder for folder in folders if not folder.resolve().is_relative_to(output.resolve().parent))
+    lines += [f"note     {folder} is not below the index: generate asks for --allow-outside {folder}" for folder in far]
     say_done(json, [output], lines, {**counts, "left_out": list(map(str, done.faults))})
 
 

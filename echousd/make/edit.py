@@ -271,8 +271,8 @@ def touched(before: SceneGraph, after: SceneGraph, boxes: Boxes | None = None) -
     if boxes is not None:
         room, names = plan_to_live_in(before, boxes), before.names
         by = [(names[k], names[i]) for k, i in attending(room)]
-        gone = {node.name for node in diff.removed}
-        moving |= {names[k] for k, i in enumerate(room.carrier.tolist()) if i >= 0 and names[i] in gone} & free
+        fallen = {names[k] for k, i in enumerate(room.carrier.tolist()) if i >= 0 and names[i] not in after.names}
+        moving |= fallen & free
     for _ in (*on, *by):  # what stands on something goes with it, and what stands on that
         moving |= {subject for subject, carrier in on if carrier in fresh | moving & free} & free
         moving |= {guest for guest, host in by if host in moving & free} & free

@@ -136,11 +136,10 @@ def read_contents(prims: RoomPrims) -> RoomContents:
     present = {thing.node.name for thing in objects}
     read = [readable(partial(relation_of, prim, names), None) for prim in prims.relations]
     stated = {relation.triple: relation for relation in read if relation is not None}.values()
-    between = tuple(each for each in stated if {each.subject, each.object} <= present)
+    here, nowhere = (tuple(r for r in stated if ({r.subject, r.object} <= present) is both) for both in (True, False))
     spec = readable(lambda: room_spec(prims), None)
     assert stage
-    nowhere = tuple(each for each in stated if each not in between)
-    return RoomContents(str(prims.room.GetPath()), spec, tuple(objects), tuple(missing), between, nowhere)
+    return RoomContents(str(prims.room.GetPath()), spec, tuple(objects), tuple(missing), here, nowhere)
 
 
 def readable_names(prims: RoomPrims) -> dict[Sdf.Path, str]:

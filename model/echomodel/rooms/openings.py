@@ -55,8 +55,6 @@ def _best(
     name = numbered(kind, [opening.name for opening in made])
     sill, tall, wide = WINDOWS[use] if kind == "window" else (0.0, USUAL[kind]["height"], USUAL[kind]["width"])
     tall = min(tall, height - sill - 0.05)
-    if tall < NARROWEST:
-        return None
     doors = [opening for opening in made if opening.kind == "door"]
     turned = signed_area(polygon) > 0
     places: list[tuple[int, float, float, str, str]] = []  # edge, offset, width, hinge and swing
@@ -68,7 +66,7 @@ def _best(
         widths = [wide] if kind == "door" else [round(float(np.clip(0.4 * (most + 2 * margin), 0.9, wide)), 4)]
         if spans is not None:
             widths = [max(min(widths[0] * share, most), NARROWEST) for share in (1.0, 0.5)]
-        if most < widths[-1]:
+        if most < widths[-1] or tall < NARROWEST:
             continue
         shared = [opening for opening in made if opening.edge == edge]
         taste = 0.2 * rng.random() + (0.6 if kind == "window" and any(d.edge == edge for d in doors) else 0.0)
