@@ -6,6 +6,7 @@ import hashlib
 import os
 import re
 import time
+import warnings
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -192,7 +193,7 @@ def _agree_on(plan: RunPlan, out: Path, *, resume: bool) -> RunPlan:
 
 
 def _valid(plan: RunPlan, out: Path, shard: tuple[int, int]) -> frozenset[str]:
-    """Ids of the shard's rooms that are there as the journal says; a damaged one is set aside."""
+    """Ids of the shard's rooms that are there as the journal says; a changed one is set aside."""
     rows, stored = read_journals(out), whole_keys(out, mend=True)
     valid = set()
     for entry in plan.part(shard):
@@ -206,7 +207,8 @@ def _valid(plan: RunPlan, out: Path, shard: tuple[int, int]) -> frozenset[str]:
             aside = inside(out, f"{STATE}/set_aside", f"{out}: the run")
             aside.mkdir(parents=True, exist_ok=True)
             there = {other.name for other in aside.iterdir()}
-            folder.rename(aside / free_name(f"{entry.id}_{int(row['when'])}", there))
+            kept = folder.rename(aside / free_name(f"{entry.id}_{int(row['when'])}", there))
+            warnings.warn(f"{folder}: changed since it was made; kept as {kept}, and made again", stacklevel=3)
     return frozenset(valid)
 
 

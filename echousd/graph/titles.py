@@ -37,9 +37,7 @@ def identifier_of(title: str, category: str, taken: Container[str]) -> str:
 def _plain_category(category: Any) -> str:
     word = normalised(category) if isinstance(category, str) else ""
     row = vocabulary().known_category(word)
-    if row is not None:
-        return row.name
-    return word if IDENTIFIER.fullmatch(word) else "object"
+    return row.name if row is not None else word if IDENTIFIER.fullmatch(word) else "object"
 
 
 def name_of(word: Any, names: Mapping[str, str]) -> Any:

@@ -103,9 +103,7 @@ def read_home(stage: Usd.Stage) -> HomeGraph:
 
 def asked(graph: SceneGraph) -> SceneGraph:
     """The graph of a room without what a plan says of it."""
-    if not graph.room.walls:
-        return graph
-    return graph.with_room(floor_polygon=None, size=None, walls=(), openings=())
+    return graph.with_room(floor_polygon=None, size=None, walls=(), openings=()) if graph.room.walls else graph
 
 
 def read_poses(path: Path) -> dict[str, tuple[SceneGraph, np.ndarray]]:

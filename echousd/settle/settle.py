@@ -273,9 +273,7 @@ def _why(stage: Usd.Stage, world: World, overlaps: Sequence[Overlap], body: Body
         return f"topples by {tilt:.0f} degrees"
     if drop > FALL:
         return f"falls {drop:.2f} m"
-    if tilt > TURN:
-        return f"tilts by {tilt:.1f} degrees: it does not stand flat"
-    return "is pushed or slides"
+    return f"tilts by {tilt:.1f} degrees: it does not stand flat" if tilt > TURN else "is pushed or slides"
 
 
 def _owner(stage: Usd.Stage, collider: str) -> str:

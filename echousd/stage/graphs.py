@@ -18,7 +18,7 @@ from echousd.naming import LAYER_FORMS
 from echousd.stage import encoding as usd
 from echousd.stage import write
 from echousd.stage.encoding import StageError
-from echousd.stage.files import usd_error
+from echousd.stage.files import layer_there, usd_error
 from echousd.stage.pen import apply_apis, relate
 from echousd.stage.read import RoomPrims, find_rooms, node_names, place, read_node, relation_of, stated, the_room, value
 from echousd.stage.values import targets
@@ -32,10 +32,13 @@ def write_graph(graph: SceneGraph, target: Sdf.Layer | Usd.Stage | str | os.Path
 
     Where `room` holds a graph already it is changed into `graph`, and only where the two differ (`update_graph`); a
     file at a path is replaced. Raises StageError for a room that is no absolute prim path and for a path that cannot be
-    written, nothing authored.
+    written or is of a layer over others, such as a room's root, nothing authored.
     """
     path = write.prim_path(room)
     if isinstance(target, str | os.PathLike):
+        if (there := layer_there(Path(target))) and there.subLayerPaths:
+            allowed = "another file, the layer itself, opened, or of a room an edit"
+            raise StageError(f"{target}: has sublayers, which a new file would lose; allowed: {allowed}")
         save_layer(write.graph_layer(graph, root=room), target)
         return
     stage = target if isinstance(target, Usd.Stage) else Usd.Stage.Open(target)

@@ -266,9 +266,8 @@ class Plan:
     @cached_property
     def ceiling(self) -> Array:
         """(N,) float, height of the ceiling over each box, metres; NaN = unknown."""
-        if self.height is None:
-            return self.kit.full_like(self.yaw, np.nan)
-        return cast(self.height, self.yaw)[self.scene]
+        unknown = self.height is None
+        return self.kit.full_like(self.yaw, np.nan) if unknown else cast(self.height, self.yaw)[self.scene]
 
     @cached_property
     def centres(self) -> Array:

@@ -314,6 +314,17 @@ def test_a_folder_that_is_missing(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_no_graph_replaces_a_layer_over_others(tmp_path):
+    """Such as the root of a room: `read_graph` reads it, and to write it back would leave nothing but the graph."""
+    root = Sdf.Layer.CreateNew(str(tmp_path / "room.usda"))
+    root.subLayerPaths.append("layers/graph.usda")
+    root.Save()
+    before = (tmp_path / "room.usda").read_bytes()
+    with pytest.raises(StageError, match=r"room\.usda: has sublayers, which a new file would lose; allowed: another"):
+        write_graph(GRAPH, tmp_path / "room.usda")
+    assert (tmp_path / "room.usda").read_bytes() == before
+
+
 def test_an_extension_that_cannot_be_written(tmp_path):
     with pytest.raises(StageError, match=r"room.usdz: extension '.usdz', allowed: .usda, .usdc, .usd$"):
         save_layer(graph_layer(GRAPH), tmp_path / "room.usdz")
