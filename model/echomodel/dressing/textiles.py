@@ -98,7 +98,7 @@ def cushion(size: Size, rng: np.random.Generator, shown: str = "", lie: tuple[fl
     cord = str(rng.choice(("linen", "ebony", "blanket", "accent_plain")))
     w -= abs(aside)
     body = pillow((0, h / 2, 0), (w / 2, h / 2, d / 2), shown or cloth)
-    made: list[Solid] = [replace(body, power=float(rng.uniform(1.7, 2.6)))]
+    made: list[Solid] = [replace(body, power=float(rng.uniform(1.3, 1.9)))]
     made += [tube(seam(body.half) + np.array([0, h / 2, 0]), 0.004, cord)] * corded
     form = {"tall": h, "lean": lean, "aside": aside, "bend": 4 * bend / w**2}
     return [Slumped(material=one.material, of=one, **form) for one in made] if lean + bend else made

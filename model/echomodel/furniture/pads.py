@@ -13,7 +13,7 @@ from echomodel.furniture.style import Style
 GIVES = {"seat": (0.42, 0.14), "back": (0.15, 0.3), "": (0.0, 0.2)}  # others are firm
 SAT, FULL = 0.62, 0.025  # metres of a seat for one person; of a crown from which on it is dented so
 LEVEL = 0.35  # of a crown that its edges are high amid a side, over the corners
-DRAWN = (0.03, 0.014)  # metres that corners are drawn in at most, and those of seats
+DRAWN = 0.018  # metres that corners are drawn in at most
 CELLS = (0.45, 0.22, 0.13, 0.1)  # metres between points of a face, by detail
 # Metres that cloth is drawn in at a seam, and along it to where it is not; radius of a cord that is sewn in.
 SEWN, BESIDE, CORD = 0.006, 0.007, 0.0058
@@ -53,7 +53,7 @@ class Pad(Block):
             far = abs(places)
             u, v = places * far.max(0) / np.maximum((far**self.power).sum(0), 1e-9) ** (1 / self.power)
         else:
-            drawn = min(1.3 * self.crown, DRAWN[self.role == "seat"]) / wide
+            drawn = min(1.3 * self.crown, DRAWN) / wide
             u, v = u * (1 - drawn[0] * v**6), v * (1 - drawn[1] * u**6)
         low = v + 0.3 * (1 - v**2) if self.role == "back" else v  # its filling has settled
         phase = 9.0 * float(self.centre @ (1.0, 0.7, 1.3))
@@ -76,7 +76,7 @@ class Pad(Block):
         return closed(points, faces, border, points.reshape(-1, 3)[border].mean(0))
 
     def seam(self) -> Array:
-        sewn = self._cloth(0)[1:-1, 1:-1]
+        sewn = self._cloth(2)[2:-2, 2:-2]
         return sewn.reshape(-1, 3)[grid(*sewn.shape[:2])[1]]
 
 
@@ -110,7 +110,7 @@ class Wrapped(Block):
         return loft(np.stack(np.broadcast_arrays(x * (1 - inward / wide), y - inward * (y + tall) / (2 * tall), z), -1))
 
     def seam(self) -> Array:
-        return self.local_mesh(0)[0][:-2].reshape(4, -1, 3)[2]
+        return self.local_mesh(2)[0][:-2].reshape(11, -1, 3)[-2]
 
 
 def corded(style: Style, *bodies: Pad | Wrapped) -> list[Solid]:

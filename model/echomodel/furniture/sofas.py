@@ -19,7 +19,7 @@ from echomodel.furniture.tufting import Tufted
 
 BODIES: list[dict[str, Any]] = list(tables("bodies.toml", __file__).values())
 padded = partial(turned, material="fabric")
-TOUCH = {"seat": 0.006, "back": 0.016}  # metres that cushions side by side press into one another, by their role
+TOUCH = {"seat": 0.01, "back": 0.012}  # metres that cushions side by side press into one another, by their role
 CLOSED = 0.016  # metres that what seats lie on reaches up into them, so that no gap is below their edges
 FLARED = 0.4  # softness up to which arms have no pad and flare
 
@@ -168,7 +168,7 @@ def _couch(
     if chaise:
         x0, x1 = (xs[0] - arm, xs[1]) if chaise < 0 else (xs[-2], xs[-1] + arm)
         reach = z0 + chaise_depth
-        parts += _rails((x0, foot, z1 - 0.1), (x1, seat - pad, reach - 0.01), 1)
+        parts += _rails((x0 + 0.02, foot, z1 - 0.1), (x1 - 0.02, seat - pad, reach - 0.03), 1)
         parts.append(cushion((x0, seat - pad, z1 - 0.04), (x1, seat, reach), style))
         t = 0.05 * style.bulk
         z = reach - 0.12
@@ -230,7 +230,7 @@ def chaise_longue_sofa(size: Size, style: Style, choices: Choices) -> list[Solid
     foot = max(0.05, _foot(style))
     seat, pad = min(0.43, h * 0.55), 0.14
     parts: list[Solid] = _legs(style, w, d, foot)
-    parts += _rails((-w / 2 + 0.015, foot, -d / 2 + 0.03), (w / 2 - 0.015, seat - pad, d / 2 - 0.01), 2)
+    parts += _rails((-w / 2 + 0.015, foot, -d / 2 + 0.03), (w / 2 - 0.015, seat - pad, d / 2 - 0.03), 2)
     parts.append(cushion((-w / 2, seat - pad, -d / 2 + 0.1), (w / 2, seat, d / 2), style))
     low, high, pivot = (-w / 2, seat - pad, -d / 2), (w / 2, h, -d / 2 + 0.15), (seat - pad, -d / 2 + 0.08)
     parts.append(leaned(cushion(low, high, style, role="back"), 0.15 + style.rake, *pivot))
