@@ -81,8 +81,8 @@ def bedding(
     cloth = str(choices.stream("cover").choice(COVERS))
     parts.append(cover((-x, y, start), (x, top, end), cloth, 0.12, 0.085, rng, falls=falls))
     fold = 0.16 + 0.1 * style.softness  # the sheet turned back over it
-    x, y = x + 0.004, low + thick * 0.4
-    parts.append(cover((-x, y, start - 0.01), (x, top + 0.02, start + fold), "linen", 0.06, 0.02, rng))
+    x, y = x + 0.012, low + thick * 0.4
+    parts.append(cover((-x, y, start - 0.01), (x, top + 0.02, start + fold), "linen", 0.06, 0.01, rng))
     return parts
 
 

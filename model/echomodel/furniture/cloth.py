@@ -18,7 +18,7 @@ HEAD = 0.38  # of half a pillow's thickness that a head has left in its middle
 SEAM = 0.025  # of half a pillow's thickness that is left at its seams
 DROOP = 0.25  # of half a pillow's thickness that its corners hang down
 SUNK = 0.0115  # metres below its highest folds at most that things lie on a cover: half of it is about as high
-LOOSE = 0.04  # metres that what hangs of a cover is in waves at most
+LOOSE, ROLLED = 0.04, 0.025  # metres that what hangs of a cover is in waves at most, and that its hem turns under
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +109,7 @@ class Cover(Block):
         w, h, d = self.half
         r, steps, (one, two, three) = min(self.radius, h, w / 2, d / 2), (5, 9, 18, 27)[detail], self.phase
         bend = r * np.pi / 2  # metres of cloth around an edge
-        roll, hang = np.linspace(0, bend, 4), bend + np.array([0.3, 0.65, 1.0]) * max(2 * h - r, 1e-3)
+        roll, hang = np.linspace(0, bend, 4), bend + np.array([0.4, 0.9, 1.0]) * max(2 * h - r, 1e-3)
         side, over = np.concatenate([roll, hang]), np.linspace(r - w, w - r, steps + 1)[1:-1]
         across = np.concatenate([r - w - side[::-1], over, w - r + side])
         flat = np.linspace(r - d, d - r, max(2, round(0.6 * steps * d / w)) + 1)[1:-1]
@@ -125,9 +125,11 @@ class Cover(Block):
         wave = 0.5 + 0.5 * np.sin(11 * line + one + 1.3 * np.sin(4 * line + two) + out[0])
         wave = wave * out[0] ** 2 + (0.5 * crease + 0.5 * wave) * out[1] ** 2
         loose = min(self.depth, LOOSE)
-        reach = (r * np.sin(turn) - loose * wave * hung) * (1 + hung * (length / np.maximum(far, 1e-9) - 1))
+        reach = (r * np.sin(turn) - loose * wave * hung - ROLLED * hung**20) * (
+            1 + hung * (length / np.maximum(far, 1e-9) - 1)
+        )
         y = h - r * (1 - np.cos(turn)) - hung * (2 * h - r) - self.depth * low * np.cos(turn)
-        y += hung * loose * (0.5 + 0.3 * np.sin(7 * line + three) + 0.2 * np.sin(13 * line + two))
+        y += hung * loose * (0.5 + 0.15 * np.sin(7 * line + three))
         slack = loose * (0.5 + 0.5 * np.sin(6 * x + two)) * np.clip(1 - (t + d) / 0.25, 0, 1)
         aside = (1 - (x / (w - r)) ** 2) * (0.1 * np.sin(2.3 * z + two) + 0.3 * np.sin(three) * z)
         top = np.stack([x + out[0] * reach + aside, y, z + out[1] * reach + slack], -1)
