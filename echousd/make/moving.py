@@ -1,4 +1,4 @@
-"""Pieces moved out of one another: which goes, who goes with it, and to where what the graph and people ask holds."""
+"""Pieces moved out of one another: which goes, and to where what the graph and people ask holds."""
 
 from collections.abc import Iterator, Sequence
 
@@ -11,17 +11,63 @@ from echomodel.boxes import Boxes
 from echomodel.boxes2d import axes
 from echomodel.objective import Plan, faults_of, unreached
 from echomodel.objective.copies import copies_of
-from echomodel.objective.support import ON_CEILING
-from echousd.graph import Placed, Relation, SceneGraph
+from echomodel.objective.physics import TOUCH
+from echousd.graph import SceneGraph
 from echousd.make.scene import EDGE, REACH, Scene
 from echousd.make.verdicts import unbroken
-from echousd.shapes.hulls import depth
+from echousd.place.geometry import Collision
+from echousd.place.living import living_faults, plan_to_live_in, severity
+from echousd.place.placing import place
+from echousd.place.solver import PlaceConfig
 
 GAP = 0.001  # metres left between what was moved apart
 DIRECTIONS = 8
-GROUPS = 3  # sets of things that are tried for one move
-ALIKE = 0.7  # cosine between the headings of seats at one side of a table
+ROUNDS = 4  # moves a piece
 ASIDE = 2.0  # a seat moves back from its table more easily than aside
+
+
+def moves_apart(
+    scene: Scene, graph: SceneGraph, room: Plan, boxes: Boxes, moves: np.ndarray, deep: float
+) -> np.ndarray:
+    """(n, 2) float, metres: moves after which nothing reaches deeper than `deep` into anything, as far as that can be
+    had; `room`: plan of the boxes."""
+    holds, stuck = frozenset(unbroken(graph, boxes)), set[tuple[int, int]]()
+    for one in range(len(moves)):
+        if scene.hangs_over(one, moves):
+            moves = moved_onto_top(scene, graph, boxes, moves, one, holds)
+    for _ in range(ROUNDS * len(moves)):
+        hits = [pair for pair, _ in scene.overlaps(moves, deep) if pair not in stuck]
+        if not hits:
+            break
+        found = moved_apart(scene, graph, room, boxes, moves, hits[0], holds)
+        if found is None:
+            stuck.add(hits[0])
+        else:
+            moves = found
+    return moves
+
+
+def worth(graph: SceneGraph, boxes: Boxes, left: Sequence[Collision], floor: np.ndarray) -> tuple[float, ...]:
+    """What a layout leaves to be wished for, the worse first: what collides, relations that hold, living rules."""
+    return len(left), -len(unbroken(graph, boxes)), severity(living_faults(graph, boxes, floor))
+
+
+def searched_anew(graph: SceneGraph, before: Boxes, after: Boxes, floor: np.ndarray) -> Boxes:
+    """A layout searched anew after moves: seats reach no deeper under tables than they were moved out of them, what
+    else was moved stays."""
+    plan = plan_to_live_in(graph, after, floor)
+    at, moves = plan.anchor, np.asarray(after.position) - np.asarray(before.position)
+    seats = plan.of("seat") & (at >= 0) & plan.of("board")[at]
+    out = np.abs(moves - np.where(seats[:, None], moves[at], 0.0)).max(1) > GAP / 2
+    who = np.flatnonzero(seats & out)
+    deep = np.maximum(-plan.apart(who, at[who]) - TOUCH, 0.0)
+    reach = tuple((int(k), float(deep[at[who] == k].min())) for k in np.unique(at[who]))
+    rows = zip(graph.nodes, after.size.tolist(), after.position.tolist(), after.yaw.tolist(), out & ~seats, strict=True)
+    nodes = (
+        node.replaced(size=tuple(size), **({"position": tuple(there), "yaw": yaw} if stays else {}))
+        for node, size, there, yaw, stays in rows
+    )
+    return place(graph.replaced(nodes=tuple(nodes)), after, config=PlaceConfig(reach=reach)).boxes
 
 
 def moved_onto_top(
@@ -51,22 +97,18 @@ def moved_apart(
 ) -> np.ndarray | None:  # fmt: skip
     """The moves with one of a pair moved out of everything, where most holds and it goes least far; None = nowhere.
 
-    What a thing would leave behind goes with it: a nightstand with its bed.
-
     `room`: plan of the boxes. `holds`: numbers of the relations that must hold afterwards as well.
     """
-    found, fewest, before = None, np.inf, np.inf
-    for together in (False, True):  # a table with its chairs, where each alone would make a fault
-        trials = list(_trials(scene, graph, boxes, moves, pair, holds, together))
-        most = max((kept for kept, _, _ in trials), default=0)
-        tried = [moves for _, _, moves in sorted((one for one in trials if one[0] == most), key=lambda one: one[1])]
-        faults = _faults(room, [moved_by(boxes, one) for one in (moves, *tried)])
-        before = next(faults)
-        for trial, count in zip(tried, faults, strict=True):
-            if count < fewest:
-                found, fewest = trial, count
-            if fewest <= before:
-                return found
+    trials = list(_trials(scene, graph, boxes, moves, pair, holds))
+    most = max((kept for kept, _, _ in trials), default=0)
+    tried = [moves for _, _, moves in sorted((one for one in trials if one[0] == most), key=lambda one: one[1])]
+    faults = _faults(room, [moved_by(boxes, one) for one in (moves, *tried)])
+    found, fewest, before = None, np.inf, next(faults)
+    for trial, count in zip(tried, faults, strict=True):
+        if count < fewest:
+            found, fewest = trial, count
+        if fewest <= before:
+            break
     return found
 
 
@@ -79,49 +121,19 @@ def _faults(room: Plan, layouts: Sequence[Boxes]) -> Iterator[int]:
 
 
 def _trials(
-    scene: Scene, graph: SceneGraph, boxes: Boxes, moves: np.ndarray, pair: tuple[int, int], holds: frozenset[int],
-    together: bool,
-) -> Iterator[tuple[int, float, np.ndarray]]:  # fmt: skip
-    """Relations that hold, what it costs, and the moves with one of a pair moved out of everything.
-
-    `together`: those who attend it go with it, but for those at the side of the other one.
-    """
+    scene: Scene, graph: SceneGraph, boxes: Boxes, moves: np.ndarray, pair: tuple[int, int], holds: frozenset[int]
+) -> Iterator[tuple[int, float, np.ndarray]]:
+    """Relations that hold, what it costs, and the moves with one of a pair moved out of everything."""
     for mover, other in (pair, pair[::-1]):
-        if scene.fixed[mover]:
+        group = carried(scene, mover)
+        if scene.fixed[mover] or other in group:
             continue
-        guests = guests_of(scene, mover, other) if together else []
-        groups = [carried(scene, mover, *guests)] if guests or not together else []
-        for group in groups:
-            if other in group:
-                continue
-            ways = _ways(free_moves(scene, group, moves), scene.heading[mover])
-            if not ways and len(groups) <= GROUPS:  # boxed in: who stands in its nearest way goes with it
-                nearest = _ways(free_moves(scene, group, moves, pushing=True), scene.heading[mover])[:1]
-                groups += [more for way in nearest if (more := pushed(scene, group, moves, way)) not in groups]
-            for way in ways:
-                trial = moves.copy()
-                trial[group] += way
-                kept = unbroken(graph, moved_by(boxes, trial))
-                broken = holds - kept
-                if not broken:
-                    yield len(kept), cost(scene, mover, way) * (1 + len(group) - len(groups[0])), trial
-                elif (more := _with_partners(scene, graph, group, broken)) not in groups and len(groups) <= GROUPS:
-                    groups.append(more)
-
-
-def _with_partners(scene: Scene, graph: SceneGraph, group: list[int], broken: set[int] | frozenset[int]) -> list[int]:
-    """A group and what it would leave behind: all whom some relations name and who are free, with what stands on them.
-
-    `broken`: numbers of verdicts, those of the relations and after them those of the placements.
-    """
-    out = list(group)
-    stated: tuple[Relation | Placed, ...] = (*graph.relations, *graph.placements)
-    for one in (stated[row] for row in sorted(broken)):
-        for name in (one.subject, one.object) if isinstance(one, Relation) else (one.subject, *one.others):
-            number = graph.names.index(name)
-            if number not in out and not scene.fixed[number]:
-                out = carried(scene, *out, number)
-    return out
+        for way in _ways(free_moves(scene, group, moves), scene.heading[mover]):
+            trial = moves.copy()
+            trial[group] += way
+            kept = unbroken(graph, moved_by(boxes, trial))
+            if not holds - kept:
+                yield len(kept), cost(scene, mover, way), trial
 
 
 def _ways(space: shapely.geometry.base.BaseGeometry, heading: float) -> list[np.ndarray]:
@@ -142,26 +154,13 @@ def carried(scene: Scene, *movers: int) -> list[int]:
     return out
 
 
-def guests_of(scene: Scene, mover: int, other: int) -> list[int]:
-    """Free things that attend a thing or hang over it, but for seats that look as another one does."""
-    around = scene.anchor == mover
-    if other < len(around):
-        around &= ~scene.seat | (np.cos(scene.heading - scene.heading[other]) < ALIKE)
-    lamps = scene.carrier == ON_CEILING
-    lamps[lamps] = shapely.contains(scene.outline[mover], shapely.centroid(np.array(scene.outline)[lamps]))
-    return [k for k in np.flatnonzero(around | lamps).tolist() if not scene.fixed[k]]
-
-
-def free_moves(scene: Scene, group: Sequence[int], moves: np.ndarray, *, pushing: bool = False) -> BaseGeometry:
-    """Further moves (x, z) of a group at which it is clear of everything by `GAP` and stays on the floor.
-
-    `pushing`: whether it only has to be clear of what stays where it is.
-    """
+def free_moves(scene: Scene, group: Sequence[int], moves: np.ndarray) -> BaseGeometry:
+    """Further moves (x, z) of a group at which it is clear of everything by `GAP` and stays on the floor."""
     space: BaseGeometry = shapely.Point(-moves[group[0]]).buffer(REACH)
     taken = []
     for one in group:
         for other in scene.near(one, moves, 2 * REACH):
-            if other not in group and (scene.fixed[other] or not pushing):
+            if other not in group:
                 way = moves[one] - moves[other] if other < len(moves) else moves[one]
                 taken.append(translate(scene.forbidden((one, other)), *-way))
         below, carrier = scene.floor, int(scene.carrier[one])
@@ -171,18 +170,6 @@ def free_moves(scene: Scene, group: Sequence[int], moves: np.ndarray, *, pushing
             if below.covers(shapely.Point(corner)):
                 space = space.intersection(translate(below, *-corner))
     return space.difference(shapely.union_all(taken).buffer(GAP, quad_segs=2))
-
-
-def pushed(scene: Scene, group: Sequence[int], moves: np.ndarray, way: np.ndarray) -> list[int]:
-    """A group and whatever free it runs into on its way (2,), with what stands on that."""
-    out, trial = list(group), moves.copy()
-    trial[out] += way
-    for one in group:
-        for other in scene.near(one, trial, 0.0):
-            free = other not in out and not scene.fixed[other]
-            if free and depth(scene.forbidden((one, other)), trial[one] - trial[other]) > 0.0:
-                out = carried(scene, *out, other)
-    return out
 
 
 def cost(scene: Scene, mover: int, way: np.ndarray) -> float:

@@ -29,7 +29,6 @@ class Scene:
     solids: Sequence[Solids]  # corners of the convex pieces of every thing in the room, metres
     fixed: np.ndarray  # (s,) bool, what must not move
     carrier: np.ndarray  # (n,) int, as `Problem.carrier`
-    anchor: np.ndarray  # (n,) int, whom each thing attends, -1 = nobody
     heading: np.ndarray  # (n,) float, yaw in radians
     seat: np.ndarray  # (n,) bool
     bulk: np.ndarray  # (n,) float, square root of the footprint, metres
@@ -118,13 +117,13 @@ def scene_of(
         [np.asarray(one.mesh.vertices, float) @ turn.T + at for one in geometry[node.name].colliders]
         for node, turn, at in placed
     ]
-    # what stands before the walls: sills, casings, leaves; walls themselves are the floor's edge
+    # what stands before the walls: sills, casings, leaves, rails; walls themselves are the floor's edge
     fitted = (piece for part in walls for filled in part.inner for piece in filled.pieces)
-    everything = [*solids, *(_boards(piece.mesh) for piece in fitted if piece.solid)]
+    everything = [*solids, *(_boards(piece.mesh) for piece in fitted)]
     fixed = [node.locked or node.position is not None for node in nodes] + [True] * (len(everything) - len(nodes))
     return Scene(
         everything, np.array(fixed),
-        room.carrier, room.anchor, yaw, room.of("seat"), np.sqrt(size[:, 0] * size[:, 2]),
+        room.carrier, yaw, room.of("seat"), np.sqrt(size[:, 0] * size[:, 2]),
         [shapely.Polygon(corner) for corner in footprints(size, position, yaw)],
         [_level(pieces) for pieces in solids], shapely.Polygon(floor).buffer(EDGE, join_style="mitre"),
         np.array([bounds_of(np.concatenate(pieces)) for pieces in everything]), walls,

@@ -141,7 +141,7 @@ def place_boxes(
         return problem_of(
             categories, size, position, yaw, triplets, floor_polygon=floor_polygon, height=height,
             fixed=held, rigid=kept, turned=turned, openings=openings, stated=stated, rules=rules,
-        )  # fmt: skip
+        ).no_deeper(config.reach)  # fmt: skip
 
     drawn = at = posed(np.where(rigid[:, None], size, np.maximum(size, SMALLEST)), position, yaw, rigid)
     if floor_polygon is not None and config.arrange:

@@ -54,6 +54,14 @@ class Problem:
         """The same room with boxes of size and at position (n, 3), metres, and yaw (n,), radians."""
         return replace(self, plan=replace(self.plan, size=size, position=position, yaw=yaw))
 
+    def no_deeper(self, reach: Sequence[tuple[int, float]]) -> "Problem":
+        """The same room, where seats reach under some tables, by number, by so many metres at most."""
+        kinds = list(self.kinds)
+        for table, metres in reach:
+            sides = self.size[self.anchor == table][:, [0, 2]].min(1)  # of which it is a share
+            kinds[table] = replace(kinds[table], admits=(("seat", metres / float(sides.max())),))
+        return replace(self, plan=replace(self.plan, kinds=tuple(kinds)))
+
     def spread(self) -> "Problem":
         """The problem whose pieces keep usual distances to walls where drawn ones are too alike, at those walls."""
         usual = kept_behind(self.categories, self.size, np.full(len(self.size), np.nan))

@@ -140,7 +140,7 @@ def _apart(problem: Problem, i: int, anchor: int, stands: str) -> tuple[float, f
     if stands == "before" and problem.kinds[anchor].name in vocabulary().cornered:
         drawn = drawn + np.array([0.0, 0.0, 0.0, INNER])
     kept, ahead = kept_apart(stands, drawn, problem.kinds[anchor].name, problem.size[anchor])
-    return max(kept, -MOST_UNDER * float(problem.size[i, 2])), ahead
+    return max(kept, -MOST_UNDER * float(problem.size[i, 2]), -float(problem.shared[i, anchor])), ahead
 
 
 def _mates(problem: Problem, stands: str, anchor: int) -> list[int]:

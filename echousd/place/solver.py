@@ -26,12 +26,14 @@ class PlaceConfig:
         anew: times that a search that still misses something takes pieces out and puts them in again.
         yields: names of terms that the search sees, but for which it does not begin anew: doors that may be moved.
         without: names of terms of the objective that the search does not see, so that others can judge by them.
+        reach: tables, by number, and metres that seats of theirs reach under them at most, as their solids allow.
     """
 
     arrange: bool = True
     anew: int = 2
     yields: frozenset[str] = frozenset()
     without: frozenset[str] = frozenset()
+    reach: tuple[tuple[int, float], ...] = ()
 
 
 MOVE, STRETCH = 0.3, 0.12  # metres, and change of the logarithm of a size, that cost as much

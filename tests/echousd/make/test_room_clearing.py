@@ -72,7 +72,7 @@ def test_a_chair_is_tucked_as_far_as_it_fits_its_back_a_millimetre_before_the_ta
         assert found is boxes
 
 
-def test_a_table_goes_with_its_other_chairs_where_one_would_be_pushed_to_the_wall():
+def test_where_a_chair_would_be_pushed_to_the_wall_a_search_moves_its_table_with_all_who_sit_there():
     things = (
         ("table", "dining_table", table_piece(), (0, 0, 1.35), 0.0, False),
         ("back", "dining_chair", chair_piece(), (0, 0, 1.55), np.pi, False),
@@ -83,13 +83,14 @@ def test_a_table_goes_with_its_other_chairs_where_one_would_be_pushed_to_the_wal
     found, left = cleared(graph, boxes, geometry, FLOOR, ())
     assert left == ()
     way = np.asarray(found.position) - np.asarray(boxes.position)
-    assert [bool(step.any()) for step in way] == [True, False, True, True]
-    assert way[[2, 3]] == pytest.approx(way[[0, 0]], abs=1e-6)
+    assert way[0].any()
+    assert way[3, ::2] == pytest.approx(way[0, ::2], abs=1e-6)  # the lamp with it
     assert not living_faults(graph, found, FLOOR)
     alone = (*things[0][:-1], True)
     graph, boxes, geometry = room(alone, *things[1:])
-    pushed = living_faults(graph, cleared(graph, boxes, geometry, FLOOR, ())[0], FLOOR)
-    assert ("back", "chair_pulls_out") in {(fault.object, fault.rule) for fault in pushed}
+    found, left = cleared(graph, boxes, geometry, FLOOR, ())
+    assert left == living_faults(graph, found, FLOOR) == ()  # the chair goes to another side
+    assert found.position[0].tolist() == boxes.position[0].tolist()
 
 
 def test_what_is_locked_stays_and_what_cannot_go_is_named():
@@ -149,11 +150,12 @@ def test_what_is_close_by_goes_along_and_no_told_relation_is_broken():
     found, left = cleared(graph, boxes, geometry, FLOOR, ())
     assert left == ()
     assert verdicts_of(graph, found) == ["kept"]
-    # locked where it is, nobody may go: the two stay, and are named
+    # locked where it is, the bed has no place within half a metre: a search finds it one farther away
     fixed = graph.replaced(nodes=tuple(node.replaced(locked=node.name != "bed") for node in graph.nodes))
     found, left = cleared(fixed, boxes, geometry, FLOOR, ())
+    assert left == ()
     assert verdicts_of(fixed, found) == ["kept"]
-    assert {left[0].first, left[0].second} == {"wardrobe", "bed"}
+    assert np.linalg.norm(found.position[1] - np.asarray(boxes.position)[1]) > 0.5
 
 
 def test_what_stands_in_a_corner_still_does_when_it_is_moved_apart():

@@ -160,6 +160,20 @@ def test_chairs_may_be_under_the_table_but_not_in_one_another() -> None:
     assert gaps[:2].min() < -0.1
 
 
+@pytest.mark.parametrize("reach", [None, 0.15, 0.0])
+def test_chairs_reach_under_their_table_by_what_their_solids_allow(reach) -> None:
+    square = np.array([(-1.6, -1.6), (1.6, -1.6), (1.6, 1.6), (-1.6, 1.6)])
+    nodes = Node("table", "dining_table"), Node("one", "dining_chair"), Node("other", "dining_chair")
+    graph = SceneGraph(RoomSpec("dining_room", floor_polygon=tuple(map(tuple, square))), nodes)
+    size = np.array([(1.4, 0.75, 0.9), (0.5, 0.9, 0.5), (0.5, 0.9, 0.5)])
+    drawn = boxes(size, np.array([(0, 0, 0), (0, 0, 0.5), (0, 0, -0.5)]), np.array([0.0, np.pi, 0.0]))
+    limit = () if reach is None else ((0, reach),)
+    found = place(graph, drawn, config=PlaceConfig(reach=limit))
+    pairs = np.array([(0, 1), (0, 2)])
+    under = -separation(found.size, found.position, found.yaw, pairs)
+    assert (under > 0.19 if reach is None else under < reach + 0.011).all(), under
+
+
 def test_noisy_rooms_get_their_relations_back() -> None:
     rng = np.random.default_rng(5)
     kept = measured = hit = 0
