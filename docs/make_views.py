@@ -501,7 +501,7 @@ def main() -> None:
     for name in sys.argv[1:] or VIEWS:
         pixels = (np.clip(from_linear(developed(drawn(name))), 0, 1) * 255 + 0.5).astype(np.uint8)
         out = io.BytesIO()
-        softened(pixels).save(out, "JPEG", quality=QUALITY)
+        softened(pixels).save(out, "JPEG", quality=QUALITY, optimize=True)
         (FOLDER / f"{name}.jpg").write_bytes(out.getvalue())
 
 

@@ -65,6 +65,15 @@ def test_images_are_small_and_keep_normals_whole():
         assert len(image) < 0.95 * len(plain.getvalue())
 
 
+def test_what_ships_is_coded_by_what_is_in_it():
+    first, plain = bytes.fromhex("00 00010501010101010100000000000000"), io.BytesIO()  # a table that fits no image
+    Image.new("RGB", (8, 8)).save(plain, "JPEG")
+    assert first in plain.getvalue()
+    assert len(baking.VIEWS) >= 8
+    for file in (*baking.VIEWS, *baking.BAKED.glob("*.jpg")):
+        assert first not in file.read_bytes(), file.name
+
+
 def test_noise_that_images_share_is_made_once():
     kinds = {row.get("kind"): name for name, row in PRINTS.items() if row.get("kind") and "cloud" not in str(row)}
     for missed in (None, 0):
