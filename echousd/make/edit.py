@@ -119,7 +119,7 @@ def edit(
             used = model_of(asked, model)
         _compare(manifest, used, chosen=bool(model or asked.weights), root=room)
         made_by = replace(made_by, preset=used.preset, model=used.hash or made_by.model)
-        again = shapes in ("parts", "sdf") or (shapes in ("library", "guided") and asked.assets is not None)
+        again = shapes in ("parts", "sdf", "boxes") or (shapes in ("library", "guided") and asked.assets is not None)
         shapes = asked.shapes or (shapes if again else default_source(used))
     names = {name: saved.assets[name] for name in graph.names if name not in shaped}
     geometry = {name: saved.geometry[name] for name in names}

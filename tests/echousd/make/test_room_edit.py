@@ -239,7 +239,7 @@ def test_furniture_of_ours_that_is_told_another_style_is_shaped_anew():
 @pytest.mark.parametrize(
     ("made", "assets", "shapes"),
     [("library", "mine.parquet", "library"), ("guided", "mine.parquet", "guided"), ("library", None, "sdf"),
-     ("boxes", "mine.parquet", "sdf"), ("parts", None, "parts")],
+     ("boxes", "mine.parquet", "boxes"), ("parts", None, "parts")],
 )  # fmt: skip
 def test_what_is_new_is_made_as_the_room_was_where_its_library_is_at_hand(root, monkeypatch, made, assets, shapes):
     asked = []
