@@ -38,6 +38,7 @@ from echousd.folder.folder import check_writable
 from echousd.folder.lock import locked
 from echousd.folder.within import inside
 from echousd.graph import SceneGraph
+from echousd.graph.files import load_graph
 from echousd.naming import free_name
 
 if TYPE_CHECKING:
@@ -124,11 +125,11 @@ def run_batch(request: BatchRequest, out: Path, how: RunOptions, there: RunPlan 
     return BatchResult(out, end.total, end.done, end.failed, end.seconds, run.stopped)
 
 
-def generate_many(graphs: Iterable[SceneGraph], *, seed: int = 0, **options: Any) -> Iterator[Room]:
+def generate_many(graphs: Iterable[SceneGraph | str | Path], *, seed: int = 0, **options: Any) -> Iterator[Room]:
     """Rooms of many graphs in one process, as `echousd.batch` of the same graphs makes them.
 
     Arguments:
-        graphs: taken one at a time. seed: of every room.
+        graphs: or files that hold one, taken one at a time. seed: of every room.
         options: those of `RoomOptions`.
 
     Raises ValueError for the first graph that no room can be made of.
@@ -136,7 +137,8 @@ def generate_many(graphs: Iterable[SceneGraph], *, seed: int = 0, **options: Any
     asked = request_of({"sources": ["graphs"], "options": options}, "generate_many").options
     for number, graph in enumerate(graphs):
         with raising(f"graph {number}:"):
-            yield work.generated(work.Job("", "", seed, asked, graph.to_json()))
+            known = graph if isinstance(graph, SceneGraph) else load_graph(graph)
+            yield work.generated(work.Job("", "", seed, asked, known.to_json()))
 
 
 def _executor(how: RunOptions, rooms: int, device: str) -> Executor:

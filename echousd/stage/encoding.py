@@ -97,11 +97,8 @@ def value_type(name: str, value: Any) -> Sdf.ValueTypeName:
     known = VALUE_TYPES.get(name)
     if known is not None:
         return known
-    if isinstance(value, bool):
-        return _TYPES.Bool
-    if isinstance(value, int):
-        return _TYPES.Int64
-    return _TYPES.Double if isinstance(value, float) else _TYPES.String
+    kinds = ((bool, _TYPES.Bool), (int, _TYPES.Int64), (float, _TYPES.Double))  # a bool is an int, too
+    return next((kind for python, kind in kinds if isinstance(value, python)), _TYPES.String)
 
 
 def plain(value: Any) -> Any:

@@ -21,12 +21,13 @@ from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
 from echousd.stage.labels import STRUCTURE, category_of_name, is_floor, is_structure, known_category, labels, spaced
 from echousd.stage.read import RoomPrims, faults, node_names, room_graph, value
-from echousd.stage.units import Z_TO_Y, to_metres
+from echousd.stage.units import Z_TO_Y, metres_per_unit, to_metres
 from echousd.stage.values import NOW, lineage
 
 TAKEN_FOR = "cabinet"  # what the networks take a fixed thing of an unknown class for
 LARGE = 0.3  # metres: a thing of an unknown class with two longer sides is in the way
 COLUMN = (1.2, 0.1, 1.2)  # metres: least height, least and largest side of what stands in the way without a label
+USUAL = (0.2, 20.0)  # metres: the largest piece of a room is shorter or longer where its unit is not what is meant
 STOREY = 2.6  # metres above a floor that its furniture stands in
 _UPRIGHT = 1e-3  # how far an axis may lean, as the deviation of a rotation matrix's entries
 _FLAT = 1e-18  # the determinant of a transform that leaves no volume
@@ -195,6 +196,11 @@ def _read(
             f"{source(stage)}: no scene graph (no EchoSceneGraph prim) and no prims with semantics labels and bounds "
             "to make one of" + ("" if names else "; --names takes the names of prims for labels")
         )
+    longest = max(max(node.size or (0.0,)) for _, node in nodes)
+    if not USUAL[0] < longest < USUAL[1]:
+        unit = f"{metres_per_unit(stage):g}" + " (not stated)" * (not UsdGeom.StageHasAuthoredMetersPerUnit(stage))
+        fits = f"its largest object is {longest:.3g} m long: does metersPerUnit, {unit}, fit?"
+        warnings.warn(f"{source(stage)}: {fits}", stacklevel=3)
     return nodes, floors, seen_words
 
 

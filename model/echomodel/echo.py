@@ -63,9 +63,7 @@ class EchoModel:
             files = sorted(file for file in source.glob("*.safetensors") if file.name != CHECKPOINT)
         if path is not None and not files:
             raise WeightsError(f"{source}: holds no weights files (.safetensors)")
-        if device is None and path is None:
-            return cls(*load_plain(files))
-        return cls(*load_weights(files, device))
+        return cls(*(load_plain(files) if device is None and path is None else load_weights(files, device)))
 
     @cached_property
     def in_torch(self) -> "EchoModel":

@@ -11,9 +11,7 @@ StageListener = Callable[[str, int, int], None]  # (stage, done, total)
 
 def part_of(progress: StepListener | None, attempt: int, tries: int) -> StepListener | None:
     """Progress of one of several draws as progress of all."""
-    if progress is None:
-        return None
-    return lambda done, steps: progress(attempt * steps + done, tries * steps)
+    return progress and (lambda done, steps: progress(attempt * steps + done, tries * steps))
 
 
 @dataclass

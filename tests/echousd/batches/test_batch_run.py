@@ -347,6 +347,8 @@ def test_shards_make_the_same_rooms_together(calm, tmp_path):
 def test_generate_many_makes_the_same_rooms(calm, tmp_path):
     source, folder, _ = calm
     graphs = [SceneGraph.from_json(source.read_text().splitlines()[k]) for k in (0, 2)]
+    (tmp_path / "second.json").write_text(graphs[1].to_json())
+    graphs[1] = tmp_path / "second.json"
     rooms = list(generate_many(graphs, **QUICK))
     for room, name in zip(rooms, ("graphs_000000", "graphs_000002"), strict=True):
         place = tmp_path / "rooms" / "0000" / name

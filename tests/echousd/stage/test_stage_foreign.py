@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -367,6 +368,21 @@ def test_an_unknown_label_is_in_the_way_where_two_sides_are_long(size, stands):
     with pytest.warns(SkippedPrims, match="fixed obstacles: 'astrolabe'" if stands else "unknown label 'astrolabe'"):
         graph = foreign_graph(stage)
     assert ("thing" in graph.names) == stands
+
+
+@pytest.mark.parametrize(
+    ("metres", "told"),
+    [(0.01, r"0.02 m long: does metersPerUnit, 0.01 \(not stated\), fit"), (100.0, "200 m long"), (1.0, "")],
+)
+def test_a_unit_that_makes_dolls_or_giants_is_doubted(metres, told, recwarn):
+    stage = Usd.Stage.CreateInMemory()
+    label(box_mesh(stage, "/World/bed", (0, 0, 0), (1.6, 0.5, 2)).GetPrim(), "bed")
+    if metres != UsdGeom.GetStageMetersPerUnit(stage):
+        UsdGeom.SetStageMetersPerUnit(stage, metres)
+    foreign_graph(stage)
+    found = [str(one.message) for one in recwarn]
+    assert bool(found) == bool(told)
+    assert not told or re.search(told, found[0])
 
 
 @pytest.mark.parametrize("untold", ["size", "position", "yaw"])
