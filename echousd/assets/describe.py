@@ -204,9 +204,7 @@ def named_by_shape(category: str, mesh: trimesh.Trimesh, dims: np.ndarray) -> st
         if category == "bookshelf" and filled > CLOSED:
             return "cabinet"
         return "bookshelf" if category == "cabinet" and filled < OPEN and dims[1] > 1.2 else category
-    if category == "chair" and dims[2] > LOUNGE and dims[1] < LOUNGE_HEIGHT:
-        return "lounge_chair"
-    return category
+    return "lounge_chair" if category == "chair" and dims[2] > LOUNGE and dims[1] < LOUNGE_HEIGHT else category
 
 
 def _places(mesh: trimesh.Trimesh, count: int = SAMPLES) -> np.ndarray:

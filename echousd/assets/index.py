@@ -225,10 +225,16 @@ DOUBT = 0.7  # confidence below which a row is coloured
 
 
 def write_page(path: Path, records: Sequence[AssetRecord]) -> None:
-    """Write an HTML page that stands alone: models by category, those that cannot be used last with the reason."""
+    """Write an HTML page that stands alone, over no other file: models by category, the unusable last, with why."""
     usable = sorted((r for r in records if r.usable), key=lambda record: record.id)
     page = template("echousd.assets", "models.html.j2", base64=lambda png: b64encode(png).decode(), swatches=swatches)
-    write_text(path, page.render(usable=usable, all=len(records), out=by_reason(records), doubt=DOUBT) + "\n")
+    text = page.render(usable=usable, all=len(records), out=by_reason(records), doubt=DOUBT) + "\n"
+    head = text.partition("<style>")[0].encode()
+    if path.is_file():
+        with path.open("rb") as there:
+            if there.read(len(head)) != head:
+                raise ValueError(f"{path}: exists and is no page of models; choose another place")
+    write_text(path, text)
 
 
 def by_reason(records: Sequence[AssetRecord]) -> dict[str, list[AssetRecord]]:

@@ -140,9 +140,7 @@ class CachedTextEncoder:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             with whole_file(self.path) as beside:
                 save_file(self._known, beside)
-        if not texts:
-            return torch.zeros(0, self.width)
-        return torch.stack([self._known[text] for text in texts])
+        return torch.stack([self._known[text] for text in texts]) if texts else torch.zeros(0, self.width)
 
     def _read(self) -> dict[str, Tensor]:
         try:

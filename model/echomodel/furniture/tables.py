@@ -19,9 +19,7 @@ def _leg(style: Style, width: float, height: float) -> float:
 def _outline(style: Style, size: Size) -> str:
     """Round where width and depth are alike and the style likes it, else with square or rounded corners."""
     alike = max(size[0], size[2]) / min(size[0], size[2]) < 1.12
-    if style.round_tops > (0.35 if alike else 0.8):
-        return "round"
-    return "corners" if style.corner > 0.45 else "square"
+    return "round" if style.round_tops > (0.35 if alike else 0.8) else "corners" if style.corner > 0.45 else "square"
 
 
 def dining_table(size: Size, style: Style, choices: Choices) -> list[Solid]:

@@ -92,6 +92,10 @@ def test_models_that_are_left_out_are_told_by_reason(tmp_path, echousd_command):
     ((reason, ids),) = reasons.items()
     assert reason.startswith("cannot be read")
     assert ids == ["desk.glb"]
+    notes = file.with_name("notes.html")
+    notes.write_text("somebody's")
+    assert "notes.html: exists and is no page of models" in echousd_command("assets", "review", file, "-o", notes).err
+    assert notes.read_text() == "somebody's"
     said = echousd_command("assets", "review", file).out
     assert f"left out 3: {unknown}\n" in said
     page = (tmp_path / "lib.html").read_text()
