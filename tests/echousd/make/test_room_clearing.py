@@ -188,6 +188,19 @@ def test_high_furniture_keeps_clear_of_a_window_sill(walls):
         assert found.position[0, 2] - 0.2 >= -2.0 + 0.04
 
 
+def test_high_furniture_beside_a_window_keeps_clear_of_its_curtain_rail():
+    window = Opening("window", "window", 0, 1.6, 1.2, 1.3, 0.9)
+    tall = piece(board((0.8, 2.4, 0.4), (0, 0, 0)))  # ends 5 cm before the window, which its rail does not
+    graph, boxes, geometry = room(("wardrobe", "wardrobe", tall, (-0.85, 0, -1.79), 0.0, False), openings=(window,))
+    walls = walls_of_room(graph, FLOOR, 2.8, 0)
+    held = graph.replaced(nodes=tuple(node.replaced(locked=True) for node in graph.nodes))
+    _, stuck = cleared(held, boxes, geometry, FLOOR, walls)
+    assert [(hit.first, hit.second) for hit in stuck] == [("wardrobe", "Wall_1")]
+    found, left = cleared(graph, boxes, geometry, FLOOR, walls)
+    assert left == ()
+    assert found is not boxes
+
+
 def test_what_is_boxed_in_takes_along_who_stands_in_its_way():
     # the bed's head is in the window's sill, the bench stands at its foot: both go, or the collision is told
     window = Opening("window", "window", 0, 1.0, 1.5, 1.2, 0.9)
