@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from echomodel.boxes2d import axes
 from echomodel.vocabulary import vocabulary
 from echousd.assets.reference import joined
 from echousd.folder.found import own_root
@@ -18,6 +19,7 @@ from echousd.graph.titles import composed, identifier_of, is_title, name_of
 from echousd.make.finished import Room
 from echousd.make.pipeline import generate, with_own_pieces
 from echousd.make.reading import SavedRoom, read_room
+from echousd.place.geometry import Floor, depth_inside
 from echousd.place.living import living_faults
 from echousd.room import RoomData
 from echousd.stage.apart import check_apart
@@ -32,7 +34,8 @@ TURNED = math.radians(0.1)
 def wished(saved: SavedRoom, wishes: EditRequest) -> SceneGraph:
     """The graph of a room after some wishes; raises `GraphError` for what cannot be read or is not there.
 
-    An object that is moved, turned or resized keeps the rest of its box as it is.
+    An object that is moved, turned or resized keeps the rest of its box as it is; one at a wall, whose place nobody
+    stated, keeps its back there when it is resized.
     """
     graph = saved.graph
     for asked in wishes.remove:
@@ -64,7 +67,11 @@ def wished(saved: SavedRoom, wishes: EditRequest) -> SceneGraph:
     for text in wishes.resize:
         name, size = _named(graph, text)
         numbers = _numbers("resize", text, size, (3,), "name:x,y,z, metres")
+        backs = _at_wall(saved, name) if graph.node(name).position is None else None
         graph = _placed(graph, saved, name).update_node(name, size=numbers)
+        if backs is not None:
+            x, z = (backs[0] + backs[1] * numbers[2] / 2).round(4).tolist()
+            graph = graph.update_node(name, position=(x, (graph.node(name).position or (0.0, 0.0))[1], z))
     graph = with_own_pieces(graph, dict(_named(graph, text) for text in wishes.reshape))
     for text in wishes.restyle:
         name, style = _parts(text)
@@ -113,6 +120,16 @@ def _placed(graph: SceneGraph, saved: SavedRoom, name: str, *, anew: bool = Fals
         "yaw": round(float(saved.boxes.yaw[row]), 7),
     }
     return graph.update_node(name, **{k: v for k, v in fields.items() if anew or getattr(node, k) is None})
+
+
+def _at_wall(saved: SavedRoom, name: str) -> tuple[np.ndarray, np.ndarray] | None:
+    """Where the back of an object is, (2,) x and z, and its front's heading; None where no wall is within 0.1 m."""
+    if saved.graph.room.corners is None or name not in saved.graph.names:
+        return None
+    row, boxes = saved.graph.names.index(name), saved.boxes
+    front = axes(np.asarray(boxes.yaw[row], float))[1]
+    back = np.asarray(boxes.position[row], float)[[0, 2]] - front * float(boxes.size[row, 2]) / 2
+    return (back, front) if depth_inside(Floor(saved.graph.room.corners), back[None])[0] < 0.1 else None
 
 
 def _added(graph: SceneGraph, text: str) -> SceneGraph:

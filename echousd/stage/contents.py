@@ -216,9 +216,7 @@ def shape_of(
     vertices, faces = surface_of(
         prim, cache, to_room, others, lambda each: readable(lambda: triangulated(each), NOTHING)
     )
-    if not len(faces):
-        return None
-    return Shape(vertices, faces, *upright_box(vertices, own[:3, :3]))
+    return Shape(vertices, faces, *upright_box(vertices, own[:3, :3])) if len(faces) else None
 
 
 def triangulated(prim: Usd.Prim) -> tuple[np.ndarray, np.ndarray]:

@@ -73,6 +73,18 @@ def test_another_category_keeps_its_place(root, echousd_command):
     assert float(turned) == pytest.approx(float(yaw), abs=1e-3)
 
 
+def test_what_stands_at_a_wall_keeps_its_back_there_when_it_is_resized(root):
+    saved = read_room(root)
+    row, wall = saved.graph.names.index("wardrobe"), float(saved.graph.room.corners[:, 0].min())
+    saved.boxes.yaw[row] = math.pi / 2  # its front looks along +X, and so its depth lies
+    for gap, x in ((0.01, wall + 0.01 + 0.4), (0.5, wall + 0.5 + float(saved.boxes.size[row, 2]) / 2)):
+        saved.boxes.position[row, 0] = wall + gap + float(saved.boxes.size[row, 2]) / 2
+        graph = wished(saved, EditRequest(resize=("wardrobe:1.2,2.0,0.8",)))
+        assert graph.node("wardrobe").position[0] == pytest.approx(x, abs=1e-3)
+    graph = wished(saved, EditRequest(move=("wardrobe:0.5,0.5",), resize=("wardrobe:1.2,2.0,0.8",)))
+    assert graph.node("wardrobe").position[::2] == (0.5, 0.5)
+
+
 def test_dry_run_says_what_would_happen_and_writes_nothing(root, echousd_command):
     before = files(root.parent)
     done = echousd_command("edit", root, "--add", "chair:stool", "--relate", "lamp left of bed", "--dry-run")
