@@ -28,8 +28,8 @@ LEVELS = 7  # sizes of an image, each half of the one before
 # Opacity of a pane below which one looks through it; twice the m² of upright glass from which on it glazes a front.
 SEEN_THROUGH, GLAZED = 0.5, 0.03
 NEXT, NEAR, FAR = 2.5, 1.2, 0.6  # metres from a passage to the wall beyond, and what light there is on the way to it
-CLOTH, SHEER = 0.22, 1.25  # the share of light that comes through cloth, and how much more through thin cloth
-HANGING = {"curtain": CLOTH, "blind": 0.08}  # of blinds, which are closer: they would be blank where it is bright
+CLOTH, SHEER = 0.22, 1.25  # share of light that comes through cloth, less through blinds; more through thin cloth
+THIN = {"curtain": CLOTH, "blind": 0.08} | dict.fromkeys(("plant", "small_plant", "floor_plant", "flowers"), 0.2)
 CEILING = np.array([0.87, 0.86, 0.84], np.float32)
 SKY_LIGHT = np.array([0.90, 0.93, 0.97], np.float32)
 BACKGROUND = np.array([0.90, 0.905, 0.915], np.float32) ** 2.2
@@ -274,7 +274,7 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False, halved: int = 0) -
         turned = mesh.normals.reshape(-1, 3) @ np.linalg.inv(mesh.world[:3, :3])  # inverse transpose, as rows
         turned = turned / np.maximum(lengths(turned), 1e-12)[:, None]
         part = plain_faces(points.reshape(-1, 3, 3), turned.reshape(-1, 3, 3), wall=walls.get(mesh.component, -1))
-        part["thin"][:], part["st"][:] = HANGING.get(mesh.category, 0.0), 0 if mesh.st is None else mesh.st
+        part["thin"][:], part["st"][:] = THIN.get(mesh.category, 0.0), 0 if mesh.st is None else mesh.st
         plain, clear = Paint(color=class_color(mesh.category), roughness=1.0), np.zeros(count, bool)
         for paint, faces in ((plain, np.arange(count)),) if by_class else mesh.paints:
             part["flat_colors"][faces], part["emissive"][faces] = paint.color, paint.emissive

@@ -90,9 +90,9 @@ def _parts(prefix: str, pieces: Sequence[MeshedSolid], body: str) -> list[Part]:
 
 
 def within_budget(solids: Sequence[Solid], size: np.ndarray, faces: int, *, round: bool = False) -> list[MeshedSolid]:
-    """The solids as fine as `faces` triangles allow, what is soft before what is hard; of too many boxes the smallest
+    """The solids as fine as `faces` triangles allow, soft ones and pots before hard ones; of too many the smallest
     are left out and it warns."""
-    soft = np.array([solid.soft for solid in solids if not solid.core])
+    soft = np.array([solid.soft or solid.role == "pot" for solid in solids if not solid.core])
     for hard, cloth in FINENESS:
         pieces = pieces_of(solids, size, np.where(soft, cloth, hard), round=round)
         count = np.array([len(piece.faces) for piece in pieces])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from echomodel.furniture import draw_choices, draw_style, solids
+from echomodel.furniture.bent import Blade
 from echomodel.furniture.plants import SPECIES, grown, species
 from echomodel.furniture.solids import pieces_of
 
@@ -37,3 +38,14 @@ def test_plants_of_the_furniture_are_of_many_species():
         leaves = [part for part in parts if part.role == "leaf"]
         seen.add((leaves[0].material, round(leaves[0].width / leaves[0].length, 3)))
     assert len(seen) >= 10
+
+
+@pytest.mark.parametrize("name", SPECIES)
+def test_leaves_that_rise_are_younger_and_lighter(name):
+    size, soil, pot = BOXES[SPECIES[name]["where"][0]]
+    leaves = [part for part in grown(name, soil, size, pot, np.random.default_rng(1)) if isinstance(part, Blade)]
+    row, rise = SPECIES[name], {leaf.material: [] for leaf in leaves}
+    for leaf in leaves:
+        rise[leaf.material].append(leaf.turn[1, 2])
+    assert set(rise) == {row["leaf"], row["young"]}
+    assert min(rise[row["young"]]) >= max(rise[row["leaf"]])

@@ -19,6 +19,6 @@ def small_plant(size: Size, rng: np.random.Generator, share: float = 0.27, where
     outer = np.stack([radius * np.interp(heights, np.linspace(0, 1, len(shape)), shape), tall * heights], 1)
     inner = outer[heights > 0.8][::-1] - (0.006, 0.0)
     foot = np.array([[0.6 * inner[-1, 0], 0.8 * tall]])
-    pot = Lathe(profile=np.concatenate([outer, inner, foot]), material=str(rng.choice(POTTERY)))
+    pot = Lathe(profile=np.concatenate([outer, inner, foot]), material=str(rng.choice(POTTERY)), role="pot")
     soil = Lathe(profile=np.array([[0.9 * radius * shape[-1], at * tall] for at in (0.7, 0.9)]), material="soil")
     return [pot, soil, *grown(kind, 0.88 * tall, size, radius, rng)]

@@ -99,5 +99,5 @@ class Blade(Solid):
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         points, normal, half = self._spine((3, 4, 5, 7)[detail])
         reach = np.maximum(half, 0.06 * self.width)[:, None]
-        out, fold, thick = reach * [1.0, 0.0, 0.0], 0.25 * reach * normal, self.thick / 2 * normal
+        out, fold, thick = reach * [1.0, 0.0, 0.0], 0.42 * reach * normal, self.thick / 2 * normal
         return loft(np.stack([points + out + fold, points + thick, points - out + fold, points - thick], 1))

@@ -36,7 +36,8 @@ def _leaf(row: dict[str, Any], base: np.ndarray, yaw: float, lift: float, length
     """A leaf that starts at `base`, points to `yaw` and rises by the angle `lift`, radians."""
     turn, thick = rotation(y=yaw) @ rotation(x=-lift), max(0.003, 0.012 * length)
     form = {"width": row["wide"] * length, "bend": row["bend"], "full": row["full"]}
-    return Blade(base, turn, row["leaf"], "leaf", length=length, thick=thick, **form)
+    slot = row["leaf" if np.degrees(lift) < np.mean(row["lift"]) else "young"]
+    return Blade(base, turn, slot, "leaf", length=length, thick=thick, **form)
 
 
 def _lift(row: dict[str, Any], share: float, rng: np.random.Generator) -> float:
@@ -77,7 +78,7 @@ def _stems(
         length = row["length"] * min(reach[0], reach[2]) * rng.uniform(0.85, 1.05)
         alone = row["along"] == 1
         tall = reach[1] * (0.3 + 0.62 * share if alone else rng.uniform(0.72, 0.95))
-        away = (0.5 - 0.2 * share if alone else 0.45 * rng.uniform(0.6, 1)) * (count > 1)
+        away = (0.5 - 0.2 * share if alone else row.get("away", 0.45) * rng.uniform(0.6, 1)) * (count > 1)
         if row["lift"][0] > 45:  # leaves go on where their stems end, as paddles do
             tall, length = reach[1] * rng.uniform(0.35, 0.55), min(length * 1.3, 0.5 * reach[1])
         foot = base + 0.35 * pot * ahead - (0, 0.02, 0)
@@ -114,10 +115,9 @@ def _tree(
 ) -> list[Solid]:
     """A trunk that forks into bent branches with leaves along them, a round crown altogether."""
     crown = reach[1] * rng.uniform(0.5, 0.7)
-    up = np.array([0.0, 1.0, 0.0])
-    middle, fork = base + up * (reach[1] - crown / 2), base + up * max(0.05, reach[1] - 1.02 * crown)
+    middle, fork = base + np.outer([reach[1] - crown / 2, max(0.05, reach[1] - 1.02 * crown)], (0.0, 1.0, 0.0))
     parts: list[Solid] = [
-        tube([base - (0, 0.02, 0), (base + fork) / 2 + (0.015, 0, 0.01), fork], 0.016, "stem", "stem")
+        tube([base - (0, 0.02, 0), (base + fork) / 2 + (0.015, 0, 0.01), fork], 0.011, "stem", "stem")
     ]
     half = np.array([reach[0], crown / 2, reach[2]])
     length = float(np.clip(row["length"] * half.min(), 0.05, 0.16))
@@ -127,7 +127,7 @@ def _tree(
         out = np.array([np.sin(around) * flat, min(level, 1.0), np.cos(around) * flat])
         tip = middle + out * half * rng.uniform(0.6, 0.75)
         bend = (fork + tip) / 2 + np.array([out[0], -0.3, out[2]]) * 0.12 * crown
-        parts.append(tube([fork, bend, tip], 0.006, "stem", "stem"))
+        parts.append(tube([fork, bend, tip], 0.0035, "stem", "stem"))
         for k in range(row["along"] + 1):
             at = 0.35 + 0.65 * k / row["along"]
             place = bend + (tip - bend) * (2 * at - 1) if at > 0.5 else fork + (bend - fork) * 2 * at
