@@ -1,14 +1,17 @@
-"""The coarse table of a room's light, by place and side; light thrown at ceilings; coloured glass."""
+"""The coarse table of a room's light, by place and side; light thrown at ceilings; coloured glass, leaves."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from box_room import LAMP, box_room, level_sheet, with_sheet
+from pxr import Usd, UsdGeom, UsdSemantics
 
 from echousd.draw import tracing
 from echousd.draw.indoors import Bounced
+from echousd.draw.scenery import read_scenery
 from echousd.draw.views import view_matrix
 
 TABLE = Bounced.dark(np.zeros(3), np.array([4.0, 3.0, 2.0]))
@@ -70,3 +73,14 @@ def test_coloured_glass_shows_its_colour_and_clear_glass_what_is_behind_it():
     )
     assert abs(red[1] - red[0]) < 0.1
     assert red[2] / same[2] < 0.93 * red[1] / same[1]
+
+
+@pytest.mark.parametrize(("category", "share"), [("floor_plant", 0.2), ("plant", 0.2), ("curtain", 0.22), ("box", 0.0)])
+def test_light_comes_through_leaves_and_cloth_and_nothing_else(category, share):
+    stage = Usd.Stage.CreateInMemory()
+    mesh = UsdGeom.Mesh.Define(stage, "/Leaf")
+    mesh.CreatePointsAttr([(0, 0, 0), (1, 0, 0), (0, 1, 0)])
+    mesh.CreateFaceVertexCountsAttr([3])
+    mesh.CreateFaceVertexIndicesAttr([0, 1, 2])
+    UsdSemantics.LabelsAPI.Apply(mesh.GetPrim(), "category").CreateLabelsAttr([category])
+    assert read_scenery(stage).thin == pytest.approx(share)
