@@ -26,7 +26,7 @@ class Relief:
     rough: np.ndarray | None = None  # (SIZE, SIZE) float, added to the roughness, None where it is even
 
 
-@lru_cache(maxsize=20)  # those of wear, paint and piles are asked for by image after image
+@lru_cache(maxsize=12)  # those of wear, paint and piles are asked for by image after image
 def noise(seed: int, along: float, across: float, power: float = 2.0) -> np.ndarray:
     """(SIZE, SIZE) periodic noise of deviation 1; features are about `SIZE / along` x `SIZE / across` pixels."""
     rng = np.random.default_rng(seed)
@@ -280,7 +280,7 @@ def stone() -> Relief:
     return Relief(1 + 0.02 * noise(98, 6.0, 6.0) - 0.5 * np.clip(noise(97, 90.0, 90.0, 4.0) - 1.9, 0, 1))
 
 
-@cache
+@lru_cache(maxsize=4)  # colour, slope and gloss of one are asked for in turn
 def relief(name: str) -> Relief:
     """The pattern that the function of that name there draws, its tone 1 in the mean."""
     drawn = globals()[name]()
