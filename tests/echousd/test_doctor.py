@@ -117,6 +117,7 @@ def test_warnings_are_one_line(tmp_path):
     (tmp_path / "foreign.usda").write_text("""#usda 1.0
 def Cube "bed" (prepend apiSchemas = ["SemanticsLabelsAPI:class"]) {
     token[] semantics:labels:class = ["bed"]
+    double size = 200
 }
 def Cube "harp" (prepend apiSchemas = ["SemanticsLabelsAPI:class"]) {
     token[] semantics:labels:class = ["harp"]
