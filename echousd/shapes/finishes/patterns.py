@@ -149,7 +149,7 @@ def woven(threads: int = 64) -> Relief:
     over = np.sin(np.pi * threads * u) * np.sin(np.pi * threads * v) > 0
     height = np.where(over, np.abs(np.sin(2 * np.pi * threads * u)), np.abs(np.sin(2 * np.pi * threads * v)))
     yarn = 0.6 * noise(31, 24.0, 200.0) + 0.6 * noise(32, 200.0, 24.0)
-    return Relief(1 + 0.05 * height + 0.02 * yarn + 0.006 * noise(33, 4.0, 4.0, 3.0), 0.0001 * height + 0.2 * creased())
+    return Relief(1 + 0.1 * height + 0.04 * yarn + 0.006 * noise(33, 4.0, 4.0, 3.0), 0.0001 * height + 0.2 * creased())
 
 
 @cache  # four cloths lie in the same
