@@ -144,11 +144,12 @@ def bed_side_free(plan: Plan) -> Found:
 
 
 def bed_along_wall(plan: Plan) -> Found:
-    """A bed is at a wall, or so far off that one gets in there; a child's narrow one always is, or at something."""
+    """A bed is at a wall, or so far off that one gets in; a child's is, if narrow and without two nightstands."""
     who, free, gaps, _ = _bed_sides(plan)
     child, xp = _of_child(plan)[who], plan.kit
+    stands = xp.bincount(plan.anchor[plan.stands("head") & (plan.anchor >= 0)], minlength=len(plan))[who]
     near = xp.where(child, xp.minimum(*free), xp.minimum(*gaps))
-    least = xp.where(child, xp.where(plan.size[who, 0] > FOR_TWO, AMID, FAR), BEDSIDE)
+    least = xp.where(child, xp.where((plan.size[who, 0] > FOR_TWO) | (stands > 1), AMID, FAR), BEDSIDE)
     return found(who, xp.maximum(near - least, SLIT - near), measure=near)
 
 

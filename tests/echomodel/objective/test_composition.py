@@ -477,6 +477,13 @@ def test_a_childs_bed_lies_along_a_wall_or_is_wide_and_free(word, width, gap, ma
     assert beside == {0: pytest.approx(0.05)}  # along what stands there
 
 
+@pytest.mark.parametrize(("stands", "margin"), [(1, -0.65), (2, 0.05)])
+def test_a_childs_bed_between_two_nightstands_is_free(stands, margin):
+    bed = ("kids_bed", (1.0, 0.8, 1.8), (1.25 - 2.5, -1.1), 0.0)
+    beside = [("nightstand", (0.4, 0.5, 0.4), (1.25 - 2.5 + side * 0.72, -1.8), 0.0) for side in (1, -1)][:stands]
+    assert seen(access.bed_along_wall, [bed, *beside])[0] == {0: pytest.approx(margin)}
+
+
 @pytest.mark.parametrize(("gap", "margin"), [(0.3, -0.05), (0.4, 0.05)])
 def test_two_get_past_the_foot_of_their_bed(gap, margin):
     bed = ("double_bed", (1.8, 1.0, 2.1), (0.0, 2.0 - gap - 1.05), 0.0)
