@@ -42,13 +42,9 @@ NESTED = 8  # archives within each other: an edit taken back holds that of the e
 
 @dataclass(frozen=True)
 class Store:
-    """A store on disk.
+    """A store on disk."""
 
-    Arguments:
-        root: its folder.
-    """
-
-    root: Path
+    root: Path  # its folder
 
     @classmethod
     def create(cls, root: str | os.PathLike[str]) -> "Store":
@@ -273,11 +269,7 @@ class _Asked:
 
 
 def _keys_in(file: IO[bytes], asked: _Asked, depth: int = 0) -> Iterator[str]:
-    """Words of a layer, manifest or archive that may be keys; what it is its first bytes say.
-
-    Arguments:
-        depth: archives around it.
-    """
+    """Words of a layer, manifest or archive that may be keys, `depth` archives deep; what it is its first bytes say."""
     head = file.read(8)
     file.seek(0)
     if head.startswith(b"PK"):

@@ -16,9 +16,7 @@ from echousd.pending import JOURNAL, STAGING
 def read_journal(folder: Path, name: str = JOURNAL) -> Journal | None:
     """The journal of an interrupted run in `folder`; None where it had not come so far, or cannot be read any more.
 
-    Arguments:
-        name: `JOURNAL`, or `journal.DONE` for that of a run whose files are in place.
-
+    `name`: `JOURNAL`, or `journal.DONE` for that of a run whose files are in place.
     Raises ValueError for entries that name anything outside of the folder; nothing was changed then.
     """
     path = folder / STAGING / name

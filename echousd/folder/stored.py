@@ -57,13 +57,10 @@ class Shelf:
         """Put the assets and images among a room's files (relative path -> content) into the store."""
         units: dict[str, dict[str, bytes]] = {}
         for path, content in files.items():
-            unit = unit_of(path)
-            if unit:
+            if unit := unit_of(path):
                 units.setdefault(unit, {})[path] = content
         for unit, inside in units.items():
-            names = {
-                PurePosixPath(path).name if path == unit else path.removeprefix(f"{unit}/"): path for path in inside
-            }
+            names = {path[len(unit) + 1 :] or PurePosixPath(path).name: path for path in inside}
             key = self.keys[unit] = self.store.put({name: inside[path] for name, path in names.items()})
             for name, path in names.items():
                 self._paths[path] = f"{self.at}/{key[:2]}/{key}/{name}"

@@ -25,6 +25,7 @@ from echousd.naming import free_name
 from echousd.options import Look
 from echousd.room import RoomData
 from echousd.shapes import looks
+from echousd.shapes.finishes.baking import let_go
 from echousd.shapes.geometry import LICENCE, Geometry, Part
 from echousd.shapes.styles import ROOM_STYLE
 from echousd.shapes.surface import Surface, surfaces
@@ -84,6 +85,7 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
     with ThreadPoolExecutor(1) as beside:  # what bakes them lets go of Python's lock
         others = beside.map(partial.__call__, of_looks[::2])
         images = [one() for one in of_looks[1::2]]
+    let_go()
     for found in (*images, *others):  # equal images are one file
         files |= dict(found.values())
     files |= lights.image_files(room)

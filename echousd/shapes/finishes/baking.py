@@ -1,5 +1,6 @@
 """Patterns as image files whose bytes are the same in every run, kept for later ones."""
 
+import sys
 from collections.abc import Callable
 from functools import cache, wraps
 from pathlib import Path
@@ -53,6 +54,12 @@ def _code() -> str:
 color_image, normal_image, rough_image = map(
     kept, lates("echousd.shapes.finishes.pictures", "color_image", "normal_image", "rough_image")
 )
+
+
+def let_go() -> None:
+    """Forget the patterns that images were baked of: up to 60 MB, which a picture of the room wants next."""
+    if patterns := sys.modules.get("echousd.shapes.finishes.patterns"):
+        patterns.relief.cache_clear()
 
 
 def hexadecimal(color: Color) -> str:

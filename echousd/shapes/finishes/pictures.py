@@ -4,7 +4,7 @@ Places on a sheet are (x, y) from its middle in heights of it, y downwards.
 """
 
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 from zlib import crc32
 
@@ -22,6 +22,7 @@ STOCK = {"paper": "f4efe6", "ink": "2d3136"}  # colours that no harmony changes
 # Patterns of wood; the shares of its red that green and blue of no wood are over: what is of another colour is painted,
 # and so much of the grain is seen through it.
 GRAINED, LIKE_WOOD, UNDER_PAINT = ("wood", "veneer"), (0.85, 0.58), 0.2
+BANDS = 16  # that an image is coloured in one after the other: all of a floor's light is 25 MB
 QUALITY = 86  # of JPEG, its hues `halved`: at half the places, which nobody sees; normals live in theirs
 Row = Mapping[str, Any]
 
@@ -212,13 +213,14 @@ def printed(name: str, harmony: str) -> np.ndarray:
 def color_image(pattern: str, color: Color, harmony: str, worn: float = 0.0) -> bytes:
     """A pattern in a colour (linear RGB), `aged` by a share, or what is printed in those of a harmony, as JPEG."""
     if pattern in PRINTS:
-        return _encoded(from_linear(printed(pattern, harmony)), QUALITY, halved=True)
+        return _encoded([from_linear(printed(pattern, harmony))], QUALITY, halved=True)
     tone = relief(pattern).tone
     if pattern in GRAINED and not (color[1] < LIKE_WOOD[0] * color[0] and color[2] < LIKE_WOOD[1] * color[0]):
         tone, worn = 1 + UNDER_PAINT * (tone - 1), UNDER_PAINT * worn
     tone = aged(tone, worn) if worn else tone
     tone = tone[..., None] if tone.ndim == 2 else tone
-    return _encoded(from_linear(np.clip(tone * np.asarray(color), 0, 1)), QUALITY, halved=True)
+    light = (np.clip(band * np.asarray(color), 0, 1) for band in np.array_split(tone, BANDS))
+    return _encoded(map(from_linear, light), QUALITY, halved=True)
 
 
 def normal_image(pattern: str, metres: float) -> bytes | None:
@@ -228,21 +230,20 @@ def normal_image(pattern: str, metres: float) -> bytes | None:
     if height is None:
         return None
     step = 2 * max(metres, 0.4) / len(height)
-    across = (np.roll(height, -1, 1) - np.roll(height, 1, 1)) / step
-    down = (np.roll(height, -1, 0) - np.roll(height, 1, 0)) / step
+    across, down = ((np.roll(height, -1, axis) - np.roll(height, 1, axis)) / step for axis in (1, 0))
     normal = np.stack([-across, down, np.ones_like(across)], -1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    return _encoded(normal / 2 + 0.5, 78)
+    return _encoded([normal / 2 + 0.5], 78)
 
 
 def rough_image(pattern: str, roughness: float) -> bytes | None:
     """Roughness about a mean, grey; None where it is even."""
     rough = None if pattern in PRINTS else relief(pattern).rough
-    return None if rough is None else _encoded(np.clip(roughness + rough, 0.05, 1), 70)
+    return None if rough is None else _encoded([np.clip(roughness + rough, 0.05, 1)], 70)
 
 
-def _encoded(value: np.ndarray, quality: int, *, halved: bool = False) -> bytes:
+def _encoded(bands: Iterable[np.ndarray], quality: int, *, halved: bool = False) -> bytes:
     out = io.BytesIO()
-    pixels = (np.clip(value, 0, 1) * 255 + 0.5).astype(np.uint8)
+    pixels = np.concatenate([(np.clip(band, 0, 1) * 255 + 0.5).astype(np.uint8) for band in bands])
     Image.fromarray(pixels).save(out, "JPEG", quality=quality, subsampling=2 * halved, optimize=True)
     return out.getvalue()

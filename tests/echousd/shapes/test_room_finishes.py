@@ -325,6 +325,8 @@ def test_first_rooms_bake_next_to_nothing(monkeypatch, tmp_path):
         monkeypatch.setattr(baking, name, lambda *given, image=image: asked.append(given) or image(*given))
     monkeypatch.setattr(baking, "from_cache", lambda kind, key, make: make())
     room = echousd.generate(starting_graph("bedroom"), progress=None)
+    relief("planks")
     room_files(room)
+    assert relief.cache_info().currsize == 0, "the picture of the room has less room"
     assert len(set(asked)) > 40
     assert len(baked) < 6, f"{baked}: run docs/make_baked.py"
