@@ -25,13 +25,13 @@ WHITER = 0.25  # how much less coloured the light of lamps is than told: no wall
 DIM = 0.004  # radiance at every place of a room without lamps and windows, so that one sees it
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
 # darker than comes to, by night and by day, and how much at most it is brightened for that.
-ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.58, 0.95), (0.34, 0.6), 70, 40.0
+ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.58, 0.95), (0.34, 0.62), 70, 40.0
 # Power of the light's brightness that eyes take from it, and inside whoever photographs rooms gives it; and what it
-# comes near to over the mean inside, where sun and lamps are blended in from darker exposures: floors keep their look.
+# comes near to over the mean inside, where lamps are blended in from darker exposures: walls keep their look.
 EVEN, LIMIT = (0.18, -0.15), (np.inf, 1.95)
 PALER = 0.32  # share of how its colour differs from the mean that they take from it, too
 WHITE, PAPER = 84, 0.95  # what so many of a hundred points are darker than comes to no more than that
-CONTRAST, KNEE = 1.55, 0.72  # power about what is bright, and from where on highlights are rolled off
+CONTRAST, SHOULDER = 1.55, 0.8  # power about what is bright, and the share of it from where highlights are rolled off
 # Share of colours that keep their hue where they are bright, which film bleaches, and how much more coloured all are,
 # by night, when lamps are warm, not yellow, and by day.
 HUE, CHROMA = (0.5, 0.8), (1.0, 1.18)
@@ -178,8 +178,7 @@ def exposure(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> Callable
     `color`: (3, n) linear radiance of the picture. `light`: (3,) that of the room, to whose colour the eye adapts in
     part. `day`: 1 by day, 0 by night, see `Lights.day`.
     """
-    by_day = (float(np.interp(day, (0, 1), ends)) for ends in (ADAPTED, BRIGHT, HUE, CHROMA))  # floats keep float32
-    adapted, bright, hue, chroma = by_day
+    adapted, bright, hue, chroma = (float(np.interp(day, (0, 1), ends)) for ends in (ADAPTED, BRIGHT, HUE, CHROMA))
     white = (np.maximum(light, 1e-6) / max(float(light.mean()), 1e-6)) ** adapted
     seen, most = np.maximum(np.percentile((LUMA / white).astype("f4") @ color, (SHARE, WHITE)), 1e-4)
     scale = (min(bright / seen, bright / BRIGHT[1] * PAPER / most, BRIGHTEST) / white).astype("f4")[:, None]
@@ -197,13 +196,14 @@ def exposure(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> Callable
 
 def _filmic(level: np.ndarray, middle: float) -> np.ndarray:
     """Contrast about a middle tone, and a shoulder."""
-    return rolled(middle * (np.maximum(level, 0) / middle) ** CONTRAST)
+    return rolled(middle * (np.maximum(level, 0) / np.float32(middle)) ** np.float32(CONTRAST), BRIGHT[1])
 
 
-def rolled(level: np.ndarray) -> np.ndarray:
-    """Bright values rolled off towards 1 from `KNEE` on instead of clipped."""
-    over = np.maximum(level - KNEE, 0)
-    return np.where(level > KNEE, KNEE + (1 - KNEE) * over / (over + 1 - KNEE), level)
+def rolled(level: np.ndarray, knee: float = 0.76) -> np.ndarray:
+    """Bright values rolled off towards 1 from a knee on instead of clipped, so that shades stay apart to eyes."""
+    shown = knee ** (1 / 2.2)
+    over = np.maximum(level / np.float32(knee), 1) ** np.float32(-SHOULDER * shown / (1 - shown) / 2.2)
+    return np.where(level > knee, (1 - np.float32(1 - shown) * over) ** np.float32(2.2), level)
 
 
 CELL = 0.5  # metres

@@ -34,14 +34,11 @@ def turned(
     return out
 
 
-def tilted(
-    light: np.ndarray, rise: np.ndarray, sun: np.ndarray, towards: np.ndarray, normal: np.ndarray, turn: np.ndarray
-) -> np.ndarray:
-    """(3, n) light that falls on surfaces whose normals (3, n) are turned by `turn` (3, n).
+def tilted(soft: np.ndarray, rise: np.ndarray, sun: np.ndarray, normal: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """(2, n) how much more soft light and sun fall on surfaces whose normals (3, n) are turned by `turn` (3, n).
 
-    `light`: (3, n) soft light on what is not turned. `rise`: (3, n) see `slanted`. `sun`: (3, n) light of the sun,
-    which is `towards` (3, 1).
+    `soft`: (3, n) light on what is not turned. `rise`: (3, n) see `slanted`. `sun`: (3, 1) where it is.
     """
-    share = 1 + along(rise, turn) / np.maximum(LUMA @ light, np.float32(1e-6))
-    steep = 1 + along(towards, turn) / np.maximum(along(towards, normal), STEEPEST)
-    return light * np.clip(share, *SHARE) + sun * np.clip(steep, *SHARE)
+    more = along(rise, turn) / np.maximum(LUMA @ soft, np.float32(1e-6))
+    steep = along(sun, turn) / np.maximum(along(sun, normal), STEEPEST)
+    return np.clip([1 + more, 1 + steep], *SHARE)

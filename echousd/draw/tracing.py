@@ -34,6 +34,7 @@ NEAR, SCATTERED, BAND = np.float32(0.5), (np.float32(1021), np.float32(769)), 0.
 # Gloss from which on surfaces mirror, and are metal, of which so much is not mirrored; how far from where a mirror
 # would a rough one mirrors.
 GLOSSY, METAL, MATT, BLUR = 0.2, 0.5, 0.4, 0.15
+SUNNY = 1.7  # of the mean light in a room: at most what the sun gives, as if blended in from darker exposures
 WASHED = 0.25  # how much less coloured a shade is that a bulb shines through
 HALO = (0.02, 0.2)  # width, of the picture's, over which what shines is spread, and the share of it
 GLINT = 1.2  # of the mean light: at most what rough surfaces mirror of a lamp, whose noise looks like smoke
@@ -325,19 +326,19 @@ def _lent(world: World, more: Seen, pixel: np.ndarray, seen: Seen, light: np.nda
 
 def _colored(world: World, everything: Seen, falling: np.ndarray) -> np.ndarray:
     """(3, n) radiance of what was seen in light (rows, n)."""
-    scenery, out, sun = world.scenery, np.empty_like(everything.glow), world.sun[:, None]
+    scenery, out, sun, inside = world.scenery, np.empty_like(everything.glow), world.sun[:, None], world.view.inside
     for here, seen in everything.blocks():
         light = falling[:, here]
         looks = seen.face, seen.bary, _breadth(world, seen), world.atlas
         color, soft = scenery.colors(*looks), light[:3] * world.contact.left(seen.point, seen.normal)
-        if world.view.inside:
+        if inside:
             upper = seen.point[1] > scenery.bounds[1][1] - UPPERMOST
             soft += THROWN * world.white[:, None].astype("f4") * np.clip(-seen.normal[1], 0, upper)
-        fallen = soft + light[4] * sun
+        shone = light[4] * sun
         if world.fine:
-            turn = turned(scenery, seen.normal, *looks)
-            fallen = tilted(soft, light[5:], light[4] * sun, world.towards, seen.normal, turn)
-        fallen = evened(fallen, world.white, world.view.inside)
+            share, steep = tilted(soft, light[5:], world.towards, seen.normal, turned(scenery, seen.normal, *looks))
+            soft, shone = soft * share, shone * steep
+        fallen = evened(soft + (not inside) * shone, world.white, inside) + inside * shone
         color += np.float32(SHEEN) * (1 - color)
         metal = scenery.gloss.take(seen.face) > METAL
         mirrored = light[3] * world.tint * np.where(metal, color, 1)
@@ -524,4 +525,6 @@ def _lit(world: World) -> World:
     # shades of the room's whole colour would be yellower than what they light
     tinted = white**0.8 * (white @ LUMA) ** 0.2
     glow = np.interp(world.scenery.lights.day, (0, 1), GLOWING) * tinted / float((emissive @ LUMA).max(initial=1e-6))
-    return world._replace(thrown=coarse.thrown, glow=glow.astype(np.float32), white=white)
+    most = float(SUNNY * white @ LUMA / max(world.sun @ LUMA, 1e-6)) if world.view.inside else 1.0
+    sun, glow = world.sun * np.float32(min(most, 1.0)), glow.astype(np.float32)
+    return world._replace(thrown=coarse.thrown, glow=glow, white=white, sun=sun)

@@ -17,7 +17,7 @@ from echousd.draw import tracing
 from echousd.draw.contact import Contact
 from echousd.draw.drawables import image_of
 from echousd.draw.from_files import render
-from echousd.draw.indoors import BRIGHT, LUMA, SHARE, Bounced, evened, exposure, read_lights
+from echousd.draw.indoors import Bounced, read_lights
 from echousd.draw.rays import World, embree
 from echousd.draw.rendering import render_stage
 from echousd.draw.scenery import CLOTH, SHEER, read_scenery, with_ceiling
@@ -506,58 +506,6 @@ def test_what_is_white_darkens_less_where_it_touches():
     )
     near = (black < np.percentile(black, 6)) & (black > 0.6)  # the floor at it, not what it hides
     assert white[near].mean() > black[near].mean() + 0.068
-
-
-def test_light_is_evened_about_its_mean():
-    light = np.array([0.1, 1.0, 10.0], np.float32) * np.ones((3, 1), np.float32)
-    even = evened(light, np.ones(3, np.float32))[0]
-    assert even[1] == pytest.approx(1.0)
-    assert 10 < even[2] / even[0] < 70  # of 100
-    sun, outside = (evened(np.full((3, 1), 5, np.float32), np.ones(3, np.float32), inside)[0, 0] for inside in (1, 0))
-    assert 1.8 < sun < 2.6  # a floor in the sun is bright and no blank
-    assert outside > 3.5
-
-
-def test_light_over_wood_and_lawns_comes_nearer_to_the_colour_of_all_of_it():
-    white, warm = np.array([1.0, 0.9, 0.8], np.float32), np.array([1.2, 0.9, 0.5], np.float32)
-    shown = [evened(one[:, None], white)[:, 0] for one in (white, warm)]
-    np.testing.assert_allclose(shown[0], white, atol=1e-6)
-    far, near = (np.ptp(np.log(one / white)) for one in (warm, shown[1]))
-    assert 0.3 * far < near < 0.7 * far
-    assert LUMA @ shown[1] == pytest.approx(LUMA @ warm, rel=0.02)  # as bright
-
-
-def exposed(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> np.ndarray:
-    color = color.astype(np.float32).reshape(-1, 3).T
-    return exposure(color, light, day)(color).T.reshape(20, 20, 3)
-
-
-def test_exposure_brings_dark_and_bright_rooms_to_one_tone():
-    rng = np.random.default_rng(0)
-    room = rng.uniform(0.2, 1.0, (20, 20, 1)) * np.ones(3)
-    white = np.ones(3)
-    dark, bright = (exposed(scale * room, white) for scale in (0.2, 5.0))
-    np.testing.assert_allclose(dark, bright, atol=1e-5)
-    assert np.percentile(bright, SHARE) == pytest.approx(BRIGHT[1], abs=0.02)
-    assert np.median(exposed(room, white, day=0.0)) < 0.8 * np.median(bright)  # the evening is darker
-    assert exposed(1e-3 * room, white).mean() < 0.1  # night stays night
-    sunny = np.where(np.arange(20)[:, None, None] < 2, 6.0, room)  # a tenth of the picture in the sun
-    assert np.median(exposed(sunny, white)) > 0.8 * np.median(bright)
-    warm = np.array([1.0, 0.7, 0.4])
-    left = exposed(warm * room, warm).mean((0, 1)) / exposed(room, white).mean((0, 1))
-    assert 1.0 < left[0] / left[2] < 1.6  # of 2.5: the eye adapts to most of a lamp's colour
-    by_night = exposed(warm * room, warm, day=0.0).mean((0, 1))
-    # to less of it by night, when lamps are warm, not yellow
-    assert left[0] / left[2] < by_night[0] / by_night[2] < 1.7
-
-
-def test_what_glares_is_bleached_and_what_does_not_keeps_its_hue():
-    room, white = np.full((3, 100), 0.5), np.ones(3)
-    shown = exposure(room.astype(np.float32), white)
-    colour = np.array([[0.4, 0.15, 0.1]], np.float32).T
-    dim, glare = shown(colour), shown(100 * colour)
-    assert glare.min() > 0.9
-    assert dim.max() / dim.min() > 3.5
 
 
 def test_a_room_is_drawn_in_the_light_that_is_asked_for(tmp_path):
