@@ -104,7 +104,7 @@ def update(
     check_ours(layer)
 
     def wanted() -> tuple[Path, SceneGraph]:
-        own, graph, moved = artists_wishes(layer)
+        own, graph, moved, changes["copies"] = artists_wishes(layer)
         for name in moved if not json else ():
             say(f"locked   {name}, where {layer.name} puts it")
         return own, graph

@@ -55,7 +55,8 @@ WISHES = tuple(EditRequest.__dataclass_fields__)
 @takes_options(OF_NEW)
 def edit(
     room: str | Path, graph: SceneGraph | None = None, *, model: RoomModel | None = None,
-    outside: Sequence[str | Path] = (), progress: StageListener | None = None, **changes: Any,
+    outside: Sequence[str | Path] = (), copies: Mapping[str, str] | None = None,
+    progress: StageListener | None = None, **changes: Any,
 ) -> Room:  # fmt: skip
     """A room whose graph was changed; objects that the change does not touch keep box, mesh and files.
 
@@ -68,6 +69,7 @@ def edit(
         graph: what its graph (`read_graph(room)`) shall become; a floor or openings that it leaves open stay those of
             the room. None = as the wishes among `changes` say.
         model, outside, progress: as for `generate`.
+        copies: new objects that share an asset of the room, of which they have the size: name -> name of the asset.
         changes: wishes in the words of `echousd edit`, lists such as `add=["stool:stool"]`, and options of what is new
             (`RoomOptions`); without these `shapes` and `faces` are those of the room.
 
@@ -110,19 +112,20 @@ def edit(
     if asked.place and whole and (rebuilt or moving | put):
         boxes = boxes_of(stated)  # before anything is searched in vain
         moving |= way(boxes, layout_outcome(graph, boxes), moving)
-    shaped = fresh | restyled(saved, graph, fresh)
+    assets, formed = {**saved.assets, **(copies or {})}, {saved.assets[name]: g for name, g in saved.geometry.items()}
+    shaped = fresh - (copies or {}).keys() | restyled(saved, graph, fresh)
     check_files(graph, beside, outside, str(room), fresh)
     used, shapes = None, asked.shapes or manifest["shapes"]
     made_by = Provenance(*(manifest[key] for key in ("seed", "preset", "model", "shapes", "source")))
-    if shaped or moving:
+    if fresh | shaped | moving:
         with timer.stage("load"), one_thread():
             used = model_of(asked, model)
         _compare(manifest, used, chosen=bool(model or asked.weights), root=room)
         made_by = replace(made_by, preset=used.preset, model=used.hash or made_by.model)
         again = shapes in ("parts", "sdf", "boxes") or (shapes in ("library", "guided") and asked.assets is not None)
         shapes = asked.shapes or (shapes if again else default_source(used))
-    names = {name: saved.assets[name] for name in graph.names if name not in shaped}
-    geometry = {name: saved.geometry[name] for name in names}
+    names = {name: assets[name] for name in graph.names if name not in shaped}
+    geometry = {name: formed[asset] for name, asset in names.items()}
     files = {asset: saved.carried[asset] for asset in names.values()}
     after = furnished(Brief(
         graph, graph, manifest["name"], asked, shapes, made_by, wishes, used, timer, there, geometry, names, files,
@@ -139,8 +142,8 @@ def update(layer: str | Path, **given: Any) -> Room:
     `given`: model, outside, progress and options of what is new, as for `edit`. Raises ValueError as that does, for a
     folder with no such layer or several, and for one that changes nothing.
     """
-    own, graph, _ = artists_wishes(layer_over(Path(layer)))
-    return edit(own, graph, **given)
+    own, graph, _, copies = artists_wishes(layer_over(Path(layer)))
+    return edit(own, graph, copies=copies, **given)
 
 
 def undo(room: str | Path, *, wait: bool = False) -> tuple[str, ...]:

@@ -82,10 +82,11 @@ def wished(saved: SavedRoom, wishes: EditRequest) -> SceneGraph:
     return graph
 
 
-def artists_wishes(root: Path) -> tuple[Path, SceneGraph, tuple[str, ...]]:
-    """What a stronger layer says otherwise than its room: the room's root layer, the graph as wished, who moved.
+def artists_wishes(root: Path) -> tuple[Path, SceneGraph, tuple[str, ...], dict[str, str]]:
+    """What a stronger layer says otherwise than its room: the room's root layer, the graph as wished, who moved, and
+    the assets of what it copied.
 
-    Objects that the layer moves or turns are fixed where it puts them, and locked.
+    Objects that the layer moves, turns or puts beside what they are copies of are fixed there, and locked.
 
     Raises ValueError where `root` is no layer over a room of ours, or changes nothing.
     """
@@ -95,18 +96,19 @@ def artists_wishes(root: Path) -> tuple[Path, SceneGraph, tuple[str, ...]]:
         raise ValueError(f"{root}: the room's own root layer; name the stronger layer that changes it")
     ours = read_room(own)
     graph, moved = theirs.graph, []
+    copies = {name: asset for name, asset in theirs.assets.items() if name not in ours.graph.names}
     for row, name in enumerate(theirs.graph.names):
-        if name not in ours.graph.names:
-            continue
-        before = ours.graph.names.index(name)
-        shift = np.asarray(theirs.boxes.position[row]) - np.asarray(ours.boxes.position[before])
-        turn = float(theirs.boxes.yaw[row]) - float(ours.boxes.yaw[before])
-        if np.linalg.norm(shift) > MOVED or abs(math.remainder(turn, 2 * math.pi)) > TURNED:
+        size = tuple(theirs.boxes.size[row].round(4).tolist())
+        graph = graph.update_node(name, size=size) if name in copies else graph
+        like = [k for k, one in enumerate(ours.graph.names) if name == one or copies.get(name) == ours.assets[one]]
+        shift = theirs.boxes.position[row] - ours.boxes.position[like]
+        turn = np.angle(np.exp(1j * (theirs.boxes.yaw[row] - ours.boxes.yaw[like])))
+        if np.all((np.linalg.norm(shift, axis=1) > MOVED) | (abs(turn) > TURNED)):
             graph = _placed(graph, theirs, name, anew=True).lock(name)
             moved.append(name)
     if not ours.graph.diff(graph).lines():
         raise ValueError(f"{root}: changes nothing about the room")
-    return own, graph, tuple(moved)
+    return own, graph, tuple(moved), copies
 
 
 def _placed(graph: SceneGraph, saved: SavedRoom, name: str, *, anew: bool = False) -> SceneGraph:
@@ -135,6 +137,8 @@ def _at_wall(saved: SavedRoom, name: str) -> tuple[np.ndarray, np.ndarray] | Non
 def _added(graph: SceneGraph, text: str) -> SceneGraph:
     """The graph with an object of `name:category`; a name in another script becomes the object's title."""
     name, category = _parts(text)
+    if ":" not in text:
+        raise GraphError(f"add: found {text!r}, allowed: name:category, such as lamp:floor_lamp")
     if not is_title(composed(name)):
         return graph.add_node(name, category)
     title = composed(name)
@@ -205,9 +209,9 @@ def adopted(
         node.replaced(locked=True, shapes=None, asset=joined(file.absolute().as_posix(), paths[node.name]))
         for node in graph.nodes
     )
-    graph = graph.replaced(nodes=theirs)
-    for node in lacking(graph) if add is None else map(_node, add):
-        graph = graph.replaced(nodes=(*graph.nodes, node))
+    graph = graph.replaced(nodes=(*theirs, *(lacking(graph) if add is None else ())))
+    for text in add or ():
+        graph = _added(graph, text)
     for text in relate:
         graph = stating(graph, text)
     return graph
@@ -242,10 +246,3 @@ def seen_in_theirs(room: RoomData) -> list[str]:
     theirs = {node.name for node in room.graph.nodes if node.locked and node.asset is not None}
     found = living_faults(room.graph, room.boxes, all_blamed=True)
     return [fault.says for fault in found if fault.object in theirs and fault.other in {None, *theirs}]
-
-
-def _node(text: str) -> Node:
-    name, colon, category = text.partition(":")
-    if not colon:
-        raise GraphError(f"add: found {text!r}, allowed: name:category, such as lamp:floor_lamp")
-    return Node(name.strip(), category.strip())

@@ -242,6 +242,35 @@ def test_python_brings_a_room_up_to_date_with_a_layer_over_it(root):
         echousd.update(path)
 
 
+def test_a_piece_that_a_stronger_layer_copies_stays_where_it_was_put_and_is_one(root, echousd_command):
+    path = root.with_name("mine.usda")
+    layer = Sdf.Layer.CreateNew(str(path))
+    layer.subLayerPaths = [f"./{root.name}"]
+    stage = Usd.Stage.Open(layer)
+    for name, at in (("wardrobe_2", (1.0, 0.0, 1.1)), ("wardrobe_3", None)):  # the third lies where the first stands
+        copy = stage.DefinePrim(f"/Room/Objects/{name}")
+        copy.GetReferences().AddInternalReference("/Room/Objects/wardrobe")
+        if at:
+            copy.GetAttribute("xformOp:translate").Set(at)
+    layer.Save()
+    before = box(root, "wardrobe")
+    done = echousd_command("update", path, "--shapes", "boxes")
+    assert done.code in (0, 1), done.err
+    assert "locked   wardrobe_2, where mine.usda puts it" in done.out
+    assert "wardrobe_3, where" not in done.out
+    saved = read_room(root)
+    assert saved.assets["wardrobe_2"] == saved.assets["wardrobe_3"] == saved.assets["wardrobe"]
+    size, position, yaw = box(path, "wardrobe_2")
+    np.testing.assert_allclose(position, (1.0, 0.0, 1.1), atol=1e-3)
+    np.testing.assert_allclose(size, before[0], atol=1e-3)
+    assert math.isclose(yaw, before[2], abs_tol=1e-3)
+    assert np.linalg.norm(box(path, "wardrobe_3")[1] - before[1]) > 0.1
+    stage = Usd.Stage.Open(str(path))
+    wardrobes = [stage.GetPrimAtPath(f"/Room/Objects/wardrobe{number}/geo") for number in ("", "_2", "_3")]
+    pieces = [len(prim.GetChildren()) for prim in wardrobes]
+    assert pieces == [pieces[0]] * 3
+
+
 @pytest.mark.parametrize("call", [
     lambda room, out: echousd.check(room).layouts[0].relations,
     lambda room, out: echousd.read_dressing(room),
