@@ -33,7 +33,7 @@ THROWN, UPPERMOST = np.float32(0.25), 0.35
 NEAR, SCATTERED, BAND = np.float32(0.5), (np.float32(1021), np.float32(769)), 0.004
 # Gloss from which on surfaces mirror, and are metal, of which so much is not mirrored; how far from where a mirror
 # would a rough one mirrors.
-GLOSSY, METAL, MATT, BLUR = 0.2, 0.5, 0.4, 0.15
+GLOSSY, METAL, MATT, BLUR = 0.2, 0.5, 0.4, 0.6
 SUNNY = 1.7  # of the mean light in a room: at most what the sun gives, as if blended in from darker exposures
 WASHED = 0.25  # how much less coloured a shade is that a bulb shines through
 HALO = (0.02, 0.2)  # width, of the picture's, over which what shines is spread, and the share of it
@@ -260,7 +260,7 @@ def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, ofte
     found[-1] = found[4] > 0
     gloss = world.scenery.gloss.take(seen.face).reshape(shape)[coarse]
     reach = (
-        (np.s_[:3], RINGS[:3]), (np.s_[3:4], RINGS[:3], gloss), (np.s_[4:5], () if inside else RINGS),
+        (np.s_[:3], RINGS[:3]), (np.s_[3:4], RINGS, gloss), (np.s_[4:5], () if inside else RINGS),
         (np.s_[5:-1], RINGS[:3] if world.fine else ()), (np.s_[-1:], RINGS[:1]),
     )  # fmt: skip
     found = smooth_light(found.reshape(-1, *asked.shape), known[0], known[1], reach)

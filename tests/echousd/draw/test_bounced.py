@@ -11,8 +11,9 @@ from pxr import Usd, UsdGeom, UsdSemantics
 
 from echousd.draw import tracing
 from echousd.draw.indoors import Bounced
+from echousd.draw.rays import Seen, World, embree
 from echousd.draw.scenery import read_scenery
-from echousd.draw.views import view_matrix
+from echousd.draw.views import View, view_matrix
 
 TABLE = Bounced.dark(np.zeros(3), np.array([4.0, 3.0, 2.0]))
 
@@ -84,3 +85,23 @@ def test_light_comes_through_leaves_and_cloth_and_nothing_else(category, share):
     mesh.CreateFaceVertexIndicesAttr([0, 1, 2])
     UsdSemantics.LabelsAPI.Apply(mesh.GetPrim(), "category").CreateLabelsAttr([category])
     assert read_scenery(stage).thin == pytest.approx(share)
+
+
+def test_the_rougher_a_floor_the_softer_it_mirrors_the_edge_of_a_window():
+    scenery, _ = box_room(sky=1.0, sun=None)
+    keep = ~(scenery.triangles[..., 0] > 1.9).all(1)  # the wall, of which a half is put back
+    names = ("triangles", "normals", "flat_colors", "emissive", "gloss", "thin", "st", "texture", "wall")
+    scenery = replace(scenery, **{name: getattr(scenery, name)[keep] for name in names})
+    scenery = with_sheet(scenery, np.array([(2, 0, -2), (2, 0, 0), (2, 3, 0), (2, 3, -2)]))
+    view = View(view_matrix(np.array([-1.9, 0.6, 0.0]), np.array([0.0, 0.0, 0.0])), 0.9, False, inside=True)
+    floor, z, none = int((scenery.triangles[..., 1] < 0.1).all(1).argmax()), np.linspace(-1, 1, 201), np.zeros(201)
+    point, up = np.stack([none - 1, none + 0.002, z]).astype("f4"), np.array([[0], [1], [0]]) + none
+    seen = Seen(np.full(201, floor), point, up.astype("f4"), np.zeros((2, 201), "f4"), 0 * point, none)
+    wide = []
+    for gloss in (0.28, 0.42):
+        shiny = replace(scenery, gloss=np.full_like(scenery.gloss, gloss))
+        world = World(embree(scenery.triangles), shiny, view, 48, np.zeros(4), Bounced.dark(*scenery.bounds), none[:3])
+        squares = np.random.default_rng(0).random((300, 2, 1), np.float32)
+        found = np.mean([tracing._mirrored(world, seen, np.broadcast_to(one, (2, 201))) for one in squares], 0)
+        wide.append(((found > 0.2 * found.max()) & (found < 0.8 * found.max())).mean() * 2)
+    assert wide[0] > 0.18 > 3 * wide[1]
