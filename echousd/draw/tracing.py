@@ -111,8 +111,8 @@ POOL, CORNERS = (0.15, 0.05), np.array(list(product((0, 1), repeat=3)))  # metre
 # metres before a surface, from where on it is no more in the way of its own light; and of what cloth is thick
 BEFORE, THICK = np.float32(2e-3), np.float32(0.016)
 # Of thin cloth before a pane: metres behind it where one begins to see, the share of what is there, the power of the
-# cosine by which that is less aside; how bright bars of the window are before the light.
-BEHIND, SEEN_BY, CLOSER, BAR = 0.05, 0.42, 6, 0.45
+# cosine by which that is less aside.
+BEHIND, SEEN_BY, CLOSER = 0.05, 0.42, 6
 MIRROR, DYED = 0.8, 0.4  # gloss of what mirrors like glass with silver behind it; by the square of how coloured it is
 # Of glass that one looks through: sheets at most, its colour, how bright is what it mirrors aside and more of what is
 # above, the share of that straight on, aslant it is more; by which shares differ at an edge; more if it is coloured.
@@ -207,8 +207,8 @@ def _seen(world: World, origin: np.ndarray, way: np.ndarray, hit: Sequence[np.nd
 
 
 def _see_through(world: World, way: np.ndarray, seen: Seen) -> None:
-    """Tell of thin cloth before a pane, which rays (3, n) met, what lies behind it: what is around, or a bar; where its
-    folds turn aside it is closer."""
+    """Tell of thin cloth before a pane, which rays (3, n) met, what is around behind it; where its folds turn aside it
+    is closer, and before bars and boards, which would look like stains, alone."""
     scenery = world.scenery
     sheer = np.flatnonzero((scenery.thin.take(seen.face) > CLOTH) & (seen.face >= 0))
     if not len(sheer):
@@ -218,8 +218,8 @@ def _see_through(world: World, way: np.ndarray, seen: Seen) -> None:
     around, through = outside(scenery, point, way)
     behind = first_hit(world, point, way)[0]
     open_ = (behind < 0) | (scenery.thin.take(behind) > 0)
-    seen.glow[:, sheer] = scenery.lights.there(around) * np.where(open_, 1, np.float32(BAR))
-    seen.shown[sheer] = SEEN_BY * through * facing**CLOSER
+    seen.glow[:, sheer] = scenery.lights.there(around)
+    seen.shown[sheer] = SEEN_BY * (through & open_) * facing**CLOSER
 
 
 def _asked(world: World, seen: Seen, pixel: np.ndarray, samples: int) -> np.ndarray:
