@@ -109,10 +109,10 @@ def setting_of(room: RoomData, layout: int = 0) -> Setting:
     )  # fmt: skip
 
 
-DECOR, OTHER = ("macrame", "wall_baskets", "wall_plates", "sunburst_mirror"), 0.3  # share of short stretches with it
-SHORT, FULL = 1.9, (0.54, 0.66)  # metres of such a stretch; shares of one that pictures take
+OTHER, SHORT = 0.4, 1.9  # share of short stretches with no pictures, and metres of such; shares that pictures take
+FULL = (0.54, 0.66)
 EMPTY = 0.65  # metres around a corner where nothing stands
-FLOORS = (5.0, 13.0, 24.0)  # m² of floor from which on one, two, three corners get something
+FLOORS = (5.0, 13.0, 24.0, 36.0)  # m² of floor from which on one, two, three, four corners get something
 
 
 def bare_walls(setting: Setting) -> None:
@@ -121,8 +121,8 @@ def bare_walls(setting: Setting) -> None:
         return
     for length, middle, wall in free_walls(setting):
         rng = setting.rng(f"wall {wall.edge}", f"bare {middle:.1f}")
-        kind = str(rng.choice(DECOR))
-        if length < SHORT and setting.resident != "child" and rng.random() < OTHER:
+        kind = str(rng.choice(setting.story.decor))
+        if length < SHORT and rng.random() < OTHER:
             size, variant = usual(kind, rng)
             one = hung_at(setting, wall, middle, kind, size, EYE - float(size[1]) / 2, variant)
             if one and kind not in {thing.kind for thing in setting.placed}:

@@ -128,9 +128,10 @@ def _free(setting: Setting, group: list[Standing]) -> shapely.Geometry:
 
 
 def clusters(setting: Setting) -> None:
-    """What lies on the floor beside furniture, as its story has it; nothing alone on bare floor."""
+    """What lies on the floor beside furniture, in large rooms at several pieces; nothing alone on bare floor."""
     rugs = _rugs(setting)
     for number, wish in enumerate(setting.story.floor):
+        left = setting.parts
         for host in setting.of(wish.by):
             rng = setting.rng(host.name, "floor", str(number))
             if not setting.has(wish.share, rng):
@@ -143,7 +144,9 @@ def clusters(setting: Setting) -> None:
                 (size, variant), turn = usual(kind, rng), float(rng.uniform(-3, 3))
                 places = first.position + np.insert(1.15 * around(first, size, rng), 1, 0.0, axis=1)
                 setting.put_first((Thing(kind, size, place, turn, "", variant) for place in places), margin=0.02)
-            break
+            left -= 1
+            if not left:
+                break
 
 
 def _by(host: Standing, wish: Wish, rng: np.random.Generator) -> Iterator[Thing]:

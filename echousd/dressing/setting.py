@@ -26,6 +26,7 @@ SKIN = 1e-4  # metres that count as nothing
 EDGE = 0.01  # metres that a small thing keeps from the edge of what it stands on
 APART = 0.008  # metres of air between a small thing and everything else
 NEARER = 0.8  # share of the distance at which two surely stand apart that is tried first
+ROOMY = 25.0  # m² of floor: so much more asks for as much again on walls and floors
 BESIDE = 0.04  # and between two that stand beside each other, each with its margin
 
 
@@ -125,6 +126,7 @@ class Setting:
 
     def __post_init__(self) -> None:
         self.room = shapely.Polygon(self.floor)
+        self.parts = 1 + int(self.room.area / ROOMY)  # of a large room, each with things of its own
         french = [zone(self.floor, o, STEP) for o in self.openings if o.kind == "window" and not o.sill]
         self.wider = self.room.buffer(0.005).difference(shapely.union_all([shapely.Polygon(way) for way in french]))
         self.ways = [(shapely.Polygon(free_area(self.floor, o)), o) for o in self.openings if o.kind != "window"]

@@ -31,6 +31,8 @@ class Story:
 
     tops: Mapping[str, tuple[Wish, ...]]
     shelves: tuple[str, ...]
+    decor: tuple[str, ...]
+    boards: tuple[str, ...]
     beds: tuple[Wish, ...]
     seats: tuple[Wish, ...]
     floor: tuple[Wish, ...]
@@ -43,7 +45,8 @@ def story(resident: str = "") -> Story:
     rows = TABLE["anyone"] | TABLE.get(resident, {})
     tops = TABLE["anyone"]["tops"] | TABLE.get(resident, {}).get("tops", {})
     wishes = {where: tuple(map(_wish, rows[where])) for where in ("beds", "seats", "floor", "sills")}
-    return Story({top: tuple(map(_wish, of)) for top, of in tops.items()}, tuple(rows["shelves"]), **wishes)
+    shelves, decor, boards = (tuple(rows[where]) for where in ("shelves", "decor", "boards"))
+    return Story({top: tuple(map(_wish, of)) for top, of in tops.items()}, shelves, decor, boards, **wishes)
 
 
 def _wish(row: dict[str, Any]) -> Wish:

@@ -20,7 +20,7 @@ laid = Late("echousd.dressing.laid:laid")
 LEVEL = 0.006  # metres: what differs less in height is one level
 LEAST, CRACK = 0.012, 5e-4  # m² of a level; metres: cracks between triangles on the grid that joins them
 AIR = 0.9  # metres of air above a top that nothing covers
-ROW = 0.8  # metres of books side by side at most, so that all are drawn
+ROW, EACH = 0.8, 0.6  # metres of books side by side at most, so that all are drawn; of a shelf for one thing more
 
 
 @dataclass(eq=False)
@@ -62,7 +62,7 @@ class Surface:
         """
         rng = setting.rng(self.host.name, kind, word, f"{self.y:.2f}")
         if size is None:
-            size, variant = usual(kind, rng)
+            size, variant = usual(kind, setting.rng("set", kind) if kind in TABLE["sets"] else rng)
         if size[1] > self.air or not self.area.area > 0:
             return None
         middle, half = self.span
@@ -190,7 +190,7 @@ def stocked(setting: Setting, host: Standing, surface: Surface) -> None:
         return
     rng = setting.rng(host.name, "shelf", f"{surface.y:.2f}")
     wide, deep = 2 * surface.span[1]
-    side = 1.0 if rng.random() < 0.5 else -1.0
+    side, books = 1.0 if rng.random() < 0.5 else -1.0, 0.0
     ware = TABLE["stocked"].get("task" if host.row.task else setting.use or host.row.top)
     if ware is None and setting.has(0.85, rng):
         length = min(wide * rng.uniform(0.4, 0.75), ROW)
@@ -203,13 +203,16 @@ def stocked(setting: Setting, host: Standing, surface: Surface) -> None:
             count, variant = max(1, int(size[0] / 0.03)), int(rng.integers(1 << 30))
             row = surface.put(setting, "book_row", at, size=size, variant=variant, count=count)
             if row:
+                books = float(size[0])
                 if setting.full:
                     shelved_books(setting, row, rng)
                 break
-    wanted = [str(kind) for kind in rng.permutation(setting.story.shelves if ware is None else ware)]
-    for number in range(2):
+    had, more = [one.kind for one in setting.placed if one.on == host.name], 2 + int((wide - books) / EACH)
+    wanted = rng.permutation(setting.story.shelves if ware is None else ware).tolist()
+    wanted.sort(key=had.count)  # first what the piece has not yet
+    for number in range(more):
         if rng.random() < 0.85:
-            places = [(x * side, 0.2) for x in (0.75, 0.4, 0.95, 0.1, -0.2, -0.6)]
-            for kind in wanted[number::2]:
+            places = [(x * side, 0.2) for x in (0.75, 0.4, 0.95, 0.1, -0.2, -0.6, -0.9)]
+            for kind in wanted[number::more]:
                 if surface.put(setting, kind, places, word=str(number)):
                     break

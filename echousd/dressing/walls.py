@@ -21,7 +21,7 @@ from echousd.shapes.joinery import assembled
 EYE = 1.52  # metres, height of a picture's middle on an empty wall
 OVER, SCREEN, LOWEST = 0.2, 0.5, 1.15  # metres between furniture, or desks, and what hangs over it; no mirror is lower
 TALLEST, HIGHEST, WIDEST = 1.45, 1.95, 2.2  # metres: what has pictures over it; their middle; all together
-MOST, CROWD = 6, 7  # pictures of one wall, and of a room: there are none in groups beyond
+MOST, CROWD = 6, (4, 3)  # pictures of one wall; of a room and each of its parts: there are none in groups beyond
 NARROWER = (1.0, 0.85, 0.7, 0.55)  # shares of its wished width that what hangs may have
 NEAR = 0.45  # metres: furniture whose back is so near to a wall stands at it
 SIDE = 0.32  # metres that curtains take beside a window
@@ -152,8 +152,8 @@ def pictures(setting: Setting) -> None:
         if wall is None or host.top > TALLEST:
             continue
         rng, least = setting.rng(host.name, "picture"), host.top + (SCREEN if host.row.top == "desk" else OVER)
-        kind, one = mirror_over(host, rng), None
-        if kind:
+        boards, one = setting.story.boards if host.row.top == "desk" else ("",), None
+        if kind := mirror_over(host, rng) or str(rng.choice(boards)):
             size, variant = usual(kind, rng)
             one = hung_at(setting, wall, along, kind, size, max(least, LOWEST), variant, host.name)
         if one is not None:
@@ -172,7 +172,7 @@ def arranged(
     """
     met = [one for one in setting.placed if KINDS[one.kind].name == "picture"]
     groups, here = Counter(one.variant for one in met), sum(abs(one.yaw - wall.yaw) < 0.01 for one in met)
-    free = min(MOST - here, CROWD - len(met))
+    free = min(MOST - here, CROWD[0] + CROWD[1] * setting.parts - len(met))
     rows = [row for row in TABLE["hung"] if (n := len(row["of"])) == 1 or (n <= free and n not in groups.values())]
     order, side, variant = rng.permutation(len(rows)), rng.choice((-1, 1)), int(rng.integers(1 << 30))
     for width, row in product(wide * np.array(NARROWER), (rows[k] for k in order)):
@@ -285,7 +285,7 @@ def free_walls(setting: Setting, least: float = 0.0) -> list[tuple[float, float,
         long = sorted(((start - end, (start + end) / 2) for start, end in runs), reverse=True)
         kept = [one for n, one in enumerate(long) if one[0] >= (least or (SECOND if n or more else STRETCH))]
         for length, middle in kept:
-            parts = 2 if length > HALL and not least else 1
+            parts = 1 if least else 1 + int(length / HALL)
             steps = (np.arange(parts) + 0.5) / parts - 0.5
             found += [(length / parts, middle + step * length, wall) for step in steps.tolist()]
     return sorted(found, key=lambda one: (-round(one[0], 4), one[2].edge, one[1]))
@@ -319,7 +319,7 @@ def shelves(setting: Setting) -> None:
         for board in [found for at in lows if (found := _hung(setting, one, [(wall, spot)], at, above=ABOVE))]:
             done += 1
             _carries(setting, board, f"wall shelf {done}")
-        if done > 1:
+        if done > setting.parts:
             return
 
 

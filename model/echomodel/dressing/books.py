@@ -1,4 +1,4 @@
-"""Books: single ones, rows, stacks."""
+"""Books: single ones and rows."""
 
 from dataclasses import replace
 from itertools import islice
@@ -6,7 +6,7 @@ from itertools import islice
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, both, box
-from echomodel.furniture.solids import Solid, rotation
+from echomodel.furniture.solids import Solid
 
 COVERS = ("book_a", "book_b", "book_c", "book_d")
 
@@ -45,20 +45,3 @@ def book(size: Size, rng: np.random.Generator) -> list[Solid]:
     sides = both(box((x - board, 0, -z), (x, h, z - back), cover))
     spine = box((-x, 0, z - max(board, 2 * back)), (x, h, z), "spines", back)
     return [*sides, spine, box((board - x, over, over - z), (x - board, h - over, z - board), "paper")]
-
-
-LAID = np.array([(0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0)])  # turns what is upright on its side
-
-
-def book_stack(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """Books that lie on one another, each a little turned and smaller than the one below."""
-    w, h, d = size
-    count = max(2, round(h / 0.03))
-    parts: list[Solid] = []
-    for number in range(count):
-        share = 0.92 * (1.0 - 0.1 * number - rng.uniform(0, 0.05))
-        middle, place = np.array([0, d * share / 2, 0]), np.array([0, (number + 0.5) * h / count, 0])
-        turn = rotation(y=float(rng.uniform(-0.14, 0.14))) @ LAID
-        upright = book(np.array([h / count, d * share, w * share]), rng)
-        parts += [replace(one, centre=turn @ (one.centre - middle) + place, turn=turn) for one in upright]
-    return parts

@@ -13,7 +13,7 @@ from echomodel.dressing import thing as solids_of
 from echomodel.furniture import draw_choices, draw_style, solids
 from echomodel.openings import Opening
 from echousd.dressing import floors, soft_tops, tabletops, upholstery, walls
-from echousd.dressing.dress import DECOR, RULES, bare_walls
+from echousd.dressing.dress import RULES, bare_walls
 from echousd.dressing.laid import laid
 from echousd.dressing.setting import Setting, geometry_of, standing
 from echousd.dressing.stories import story
@@ -226,11 +226,11 @@ def test_bare_walls_have_other_things_than_pictures_each_once():
     for seed in range(30):
         room = replace(setting(seed=seed), floor=0.45 * FLOOR)
         bare_walls(room)
-        others = [thing for thing in room.placed if thing.kind in DECOR]
+        others = [thing for thing in room.placed if thing.kind in room.story.decor]
         assert len({thing.kind for thing in others}) == len(others) < len(room.placed)
         assert all(1.4 < thing.position[1] + thing.size[1] / 2 < 1.65 for thing in others)
         met |= {thing.kind for thing in others}
-    assert met == set(DECOR)
+    assert met == set(room.story.decor)
 
 
 def test_a_hall_has_two_groups_on_a_wall_and_both_sides_of_a_door_something(monkeypatch):

@@ -1,5 +1,6 @@
 """Small things tell who lives in a room: what is asked for, what the furniture suggests, and where it lies."""
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -63,8 +64,8 @@ def kinds_on(room, name):
 
 
 def test_every_resident_has_a_story_of_kinds_and_tops_that_there_are():
-    assert set(TABLE) == {"places", "once", "straight", "loose", "stocked", "hung", "anyone", *RESIDENTS}
-    for kinds in (TABLE["once"], TABLE["straight"], TABLE["loose"], *TABLE["stocked"].values()):
+    assert set(TABLE) == {"places", "once", "sets", "straight", "loose", "stocked", "hung", "anyone", *RESIDENTS}
+    for kinds in (TABLE["once"], TABLE["sets"], TABLE["straight"], TABLE["loose"], *TABLE["stocked"].values()):
         assert {*kinds} <= {*KINDS}
     tops = {row.top for row in vocabulary().categories}
     words = {word for row in vocabulary().categories for word in (row.role, row.top, *row.invites)}
@@ -73,7 +74,7 @@ def test_every_resident_has_a_story_of_kinds_and_tops_that_there_are():
         lists = (told.beds, told.seats, told.floor, told.sills, *told.tops.values())
         wishes = [wish for one in lists for wish in one]
         assert {kind for wish in wishes for among in (wish.of, *wish.beside) for kind in among} <= {*KINDS}
-        assert {*told.shelves} <= {*KINDS}
+        assert {*told.shelves, *told.decor, *told.boards} <= {"", *KINDS}
         assert set(told.tops) <= tops
         assert {wish.by for wish in (*told.seats, *told.floor)} <= words
         assert all(wish.at for wish in wishes)
@@ -195,3 +196,27 @@ def test_pictures_that_hang_together_fill_their_width_in_one_form_and_apart(row)
     assert 0.25 < row["wide"][0] * w.min() < row["wide"][1] * w.max() < 1.7
     boxes = shapely.box(x - w / 2, y - h / 2, x + w / 2, y + h / 2)
     assert all(one.distance(other) > 0.02 for one, other in combinations(boxes, 2))
+
+
+def test_glasses_of_a_room_are_a_set_and_those_of_rooms_differ(rooms):
+    forms = {who: {t.recipe for t in dressed(room).placed if t.kind == "glass"} for who, room in rooms.items()}
+    assert all(len(found) <= 1 for found in forms.values())
+    table, tried = TABLE["sets"], set()
+    for seed in range(12):
+        setting = setting_of(replace(rooms[None], provenance=replace(rooms[None].provenance, seed=seed)))
+        surface = tabletops.surfaces(setting.objects["desk"])[0]
+        placed = [surface.put(setting, table[0], [(side, 0.0)], word=str(side)) for side in (-0.8, 0.8)]
+        assert placed[0].recipe == placed[1].recipe
+        tried.add(placed[0].recipe)
+    assert len(tried) > 3
+
+
+def test_large_rooms_have_things_beside_more_than_one_piece():
+    boards = "".join(f"  - {{name: shelf_{n}, category: bookshelf}}\n" for n in range(4))
+    beside = []
+    for size in ("[4.6, 4.2]", "[9.0, 8.0]"):
+        graph = SceneGraph.from_yaml(f"room: {{type: study, size: {size}, resident: office}}\nnodes:\n{boards}")
+        setting = dressed(echousd.generate(graph, seed=3, shapes="boxes", dress="full"))
+        wish = next(wish for wish in setting.story.floor if wish.by == "basket")
+        beside.append(sum(t.kind in wish.of and t.position[1] == 0.0 for t in setting.placed))
+    assert beside[1] > beside[0]
