@@ -17,6 +17,7 @@ from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import fronts, label_relations, label_rooms, margins, measured, rule_set, verdicts
 from echomodel.rules.geometry import pairs
 from echomodel.rules.margins import judged, pair_margins
+from echomodel.rules.sets import NEAR
 from echomodel.rules.telling import stated_relations
 from echomodel.vocabulary import vocabulary
 
@@ -227,6 +228,19 @@ def test_what_stands_in_the_middle_of_a_long_side_is_near_and_labelled_by_corner
     told = torch.tensor([[1, near, 0], [2, near, 0]])
     assert verdicts(room, told).tolist() == [1, 0]  # the lamp hangs far above it
     assert not (label_relations(room)[:, 1] == near).any()
+
+
+@pytest.mark.parametrize(("words", "wide", "most"), [
+    (("sideboard", "dining_table"), (1.4, 1.8), 0.9), (("armchair", "coffee_table"), (0.8, 1.1), 0.55),
+    (("wardrobe", "double_bed"), (2.4, 2.0), 0.9), (("bookshelf", "bookshelf"), (0.8, 0.8), NEAR),
+])  # fmt: skip
+def test_what_is_near_is_half_as_far_as_the_longer_one_is_long_or_its_corners_are_near(words, wide, most):
+    size = [[long, 0.8, 0.3] for long in wide]
+    told = torch.tensor([[0, vocabulary().predicate_id("close_by"), 1]])
+    for gap, kept in ((most - 0.01, 1), (most + 0.01, 0)):
+        room = room_of(list(words), size, [[0, 0, 0.3 + gap], [0, 0, 0]])
+        far = room_of(list(words), size, [[wide[0] / 2 + wide[1] / 2 + gap, 0, 0], [0, 0, 0]])
+        assert [verdicts(one, told).tolist() for one in (room, far)] == [[kept]] * 2
 
 
 def test_labels_from_style_category_and_model():

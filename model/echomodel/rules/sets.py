@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from echomodel.arrays import Array, at_least, dot, kit
+from echomodel.arrays import Array, at_least, clipped, dot, kit
 from echomodel.boxes2d import axes, hull, seen
 from echomodel.files import tables
 from echomodel.rules.geometry import TINY, PairGeometry
@@ -23,7 +23,7 @@ VOLUME = 0.15  # relative difference of volume for bigger and smaller
 HEIGHT = 0.1  # relative difference of the tops for taller and shorter
 TOUCH = 0.04  # metres of vertical play for standing on
 NEAR = 0.45  # metres for close by and symmetrical to
-SIDES = 0.2  # metres between sides that are close by as well, however long they are
+SIDES, ACROSS = 0.2, 0.9  # metres between sides that are close by as well: half the longer box, within these
 LOOK = math.cos(math.radians(30.0))  # of the angle between two ways that are the same
 
 
@@ -128,10 +128,11 @@ def _close(pair: PairGeometry) -> Array:
 
 
 def _near(pair: PairGeometry) -> Array:
-    """Corners are close, as published, or sides: a chair in the middle of a long table's side is near it, too."""
+    """Corners are close, as published, or sides: real sideboards keep a metre from their table, for its chairs."""
     xp = pair.kit
+    reach = clipped(xp.amax(xp.maximum(pair.size_s, pair.size_o)[:, ::2], 1) / 2, SIDES, ACROSS)
     level = xp.maximum(pair.position_s[:, 1] - pair.top_o, pair.position_o[:, 1] - pair.top_s)
-    sides = xp.minimum(SIDES + pair.footprint_penetration, NEAR - level)
+    sides = xp.minimum(reach + pair.footprint_penetration, NEAR - level)
     return xp.maximum(_close(pair), sides)
 
 
@@ -141,8 +142,7 @@ def _symmetrical(pair: PairGeometry) -> Array:
         return NEAR - pair.mirror_distance(point=False)
     xp, near = pair.kit, NEAR - pair.mirror_distances[:, :2]
     alike = xp.where(pair.fronts[:, None], pair.mirror_likeness - LOOK, near)
-    both = xp.minimum(near, alike)
-    return xp.maximum(both[:, 0], both[:, 1])
+    return xp.amax(xp.minimum(near, alike), 1)
 
 
 def _rules(
@@ -179,8 +179,8 @@ CARRIED: dict[str, Margin] = {
 }
 STRICT = RuleSet("strict", True, _rules(APART, _larger, CARRIED, _symmetrical))
 MEANS: dict[str, str] = tables("means.toml", __file__)
-NUMBERS = dict(APART=APART, OVERLAP=OVERLAP, NEAR=NEAR, SIDES=SIDES, TOUCH=TOUCH, VOLUME=VOLUME, HEIGHT=HEIGHT)
-STRICT.rules.update({name: replace(rule, means=MEANS[name].format(**NUMBERS)) for name, rule in STRICT.rules.items()})
+MEANT = {name: replace(rule, means=MEANS[name].format_map(globals())) for name, rule in STRICT.rules.items()}
+STRICT.rules.update(MEANT)
 
 PUBLISHED: dict[str, Margin] = {"standing_on": lambda pair: TOUCH - abs(pair.position_s[:, 1] - pair.position_o[:, 1])}
 OPEN = ("standing_on", "symmetrical_to")
