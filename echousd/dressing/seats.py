@@ -3,22 +3,8 @@
 import numpy as np
 
 from echomodel.boxes2d import upright
+from echousd.dressing import soft_tops as tops
 from echousd.dressing.setting import Setting, Standing, Thing
-from echousd.dressing.soft_tops import (
-    LEVEL,
-    LIFTED,
-    RAISED,
-    STEP,
-    TRIES,
-    Design,
-    Seat,
-    across,
-    clear_of,
-    corners_of,
-    heights_of,
-    let_down,
-    put,
-)
 
 MORE = (1.9, 2.4)  # metres of a sofa with a third cushion in its middle, and with two
 OVER, SHORT, LONG = 0.019, (0.2, 0.3), (0.32, 0.45)  # metres of a throw's top over an arm, and that it hangs down
@@ -30,7 +16,7 @@ RIDGE = 0.1  # metres that an arm is higher than the seat at least so that a thr
 
 
 def cushions_on(
-    setting: Setting, host: Standing, seat: Seat, pair: Design, odd: Design, rng: np.random.Generator
+    setting: Setting, host: Standing, seat: tops.Seat, pair: tops.Design, odd: tops.Design, rng: np.random.Generator
 ) -> None:
     """Cushions in the corners of a sofa, a pair or two that differ, on a wide one others between; one on an armchair.
 
@@ -51,8 +37,8 @@ def cushions_on(
         leant = np.clip([lean * size[1], bend], (0.1 * size[1], 0.0), (0.4 * size[1], 0.08)) // BY * BY
         for lie in (tuple(leant.round(2).tolist()), (0.0, 0.0)):  # upright on what is too shallow
             deep = size + np.array([0.0, 0.0, sum(lie)])
-            spot = standing_on(host, at_back(seat, end, deep), turn, deep, corners_of(kind, deep, variant, lie))
-            if put(setting, host, spot, kind, deep, turn, variant, lie):
+            spot = standing_on(host, at_back(seat, end, deep), turn, deep, tops.corners_of(kind, deep, variant, lie))
+            if tops.put(setting, host, spot, kind, deep, turn, variant, lie):
                 break
 
 
@@ -60,13 +46,13 @@ def standing_on(
     host: Standing, spot: np.ndarray | None, turn: float, size: np.ndarray, body: np.ndarray
 ) -> np.ndarray | None:
     """The spot (3,) or one near it where a turned cushion stands level and reaches into nothing; None = nowhere."""
-    for _ in range(TRIES):
-        spot = None if spot is None else clear_of(host, spot, turn, body)
-        down = None if spot is None else let_down(host, spot, size)
+    for _ in range(tops.TRIES):
+        spot = None if spot is None else tops.clear_of(host, spot, turn, body)
+        down = None if spot is None else tops.let_down(host, spot, size)
         if down is None:
             return None
-        spot = clear_of(host, down + np.array([0.0, LIFTED, 0.0]), turn, body)
-        if spot is not None and np.abs(spot - down).max() < LEVEL:
+        spot = tops.clear_of(host, down + np.array([0.0, tops.LIFTED, 0.0]), turn, body)
+        if spot is not None and np.abs(spot - down).max() < tops.LEVEL:
             return np.array([spot[0], down[1], spot[2]])
     return None
 
@@ -75,16 +61,17 @@ def behind(host: Standing, spot: np.ndarray, turn: float, size: np.ndarray) -> n
     """(3,) float of what is behind a turned cushion at a spot (3,): metres a metre that it is nearer at the right, and
     further away over the seat, and metres that it is nearer at both sides than in the middle."""
     corners = (host.geometry.mesh.triangles - spot) @ upright(turn)
-    ends = heights_of(corners[corners[..., 2].max(1) < size[2]][..., [0, 2, 1]], ACROSS * size[0], UPWARDS * size[1])
+    corners = corners[corners[..., 2].max(1) < size[2]]
+    ends = tops.heights_of(corners[..., [0, 2, 1]], ACROSS * size[0], UPWARDS * size[1])
     x, y = (line[ends > -REACH] for line in np.meshgrid(ACROSS * size[0], UPWARDS * size[1], indexing="ij"))
     terms = np.stack([x, -y, (2 * x / size[0]) ** 2, 1 + 0 * x], 1)
     return np.linalg.lstsq(terms, ends[ends > -REACH], rcond=None)[0][:3]
 
 
-def at_back(seat: Seat, end: float, size: np.ndarray) -> np.ndarray | None:
+def at_back(seat: tops.Seat, end: float, size: np.ndarray) -> np.ndarray | None:
     """(3,) a place on the seat against the back, towards one end (-1 to 1); None where there is none."""
     free = np.abs(seat.height - seat.level) < 0.07
-    wide, deep = (max(1, int(np.ceil(size[k] / STEP))) for k in (0, 2))
+    wide, deep = (max(1, int(np.ceil(size[k] / tops.STEP))) for k in (0, 2))
     if wide > len(seat.x) or deep > len(seat.z):
         return None
     total = np.cumsum(np.cumsum(np.pad(free.astype(int), ((1, 0), (1, 0))), 0), 1)
@@ -94,18 +81,18 @@ def at_back(seat: Seat, end: float, size: np.ndarray) -> np.ndarray | None:
         return None
     wish = (1 + end) * (len(seat.x) - wide) / 2
     i, k = fits[int(np.argmin(fits[:, 1] * 1.5 + np.abs(fits[:, 0] - wish)))]
-    above = seat.level + RAISED / 4  # it may be fuller in its middle
-    return np.array([seat.x[i] + (wide - 1) * STEP / 2, above, seat.z[k] + (deep - 1) * STEP / 2])
+    above = seat.level + tops.RAISED / 4  # it may be fuller in its middle
+    return np.array([seat.x[i] + (wide - 1) * tops.STEP / 2, above, seat.z[k] + (deep - 1) * tops.STEP / 2])
 
 
-def over_arm(host: Standing, seat: Seat, side: float, rng: np.random.Generator) -> Thing | None:
+def over_arm(host: Standing, seat: tops.Seat, side: float, rng: np.random.Generator) -> Thing | None:
     """A throw over the arm of a sofa at a side, below 0 the left one; None where there is none to hang it over."""
     z, deep = 0.12 * float(host.size[2]), float(rng.uniform(0.42, 0.6))
     under = seat.height[:, np.abs(seat.z - z) < deep / 2]
     level = under.min(1)
     arm = (level > seat.level + RIDGE) & (np.sign(side) * seat.x > 0.3 * host.size[0])
-    if not 0.08 < arm.sum() * STEP < 0.34 or np.ptp(under[arm], axis=1).max() > RISE:
+    if not 0.08 < arm.sum() * tops.STEP < 0.34 or np.ptp(under[arm], axis=1).max() > RISE:
         return None
     high = float(np.median(level[arm]))
     falls = np.minimum(rng.uniform(SHORT, LONG), (high - seat.level - 0.03, high - 0.12))  # over the seat, outside
-    return across(host, seat, arm, z, deep, falls[:: int(side)], OVER, rng)
+    return tops.across(host, seat, arm, z, deep, falls[:: int(side)], OVER, rng)

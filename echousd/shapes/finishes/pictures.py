@@ -229,7 +229,7 @@ def normal_image(pattern: str, metres: float) -> bytes | None:
     height = None if cloth in PRINTS else relief(cloth).height
     if height is None:
         return None
-    step = 2 * max(metres, 0.4) / len(height)
+    step = 2 * max(metres, 0.6) / len(height)
     across, down = ((np.roll(height, -1, axis) - np.roll(height, 1, axis)) / step for axis in (1, 0))
     normal = np.stack([-across, down, np.ones_like(across)], -1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)

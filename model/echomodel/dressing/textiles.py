@@ -122,6 +122,8 @@ def throw(size: Size, rng: np.random.Generator, lie: tuple[float, ...] = ()) -> 
     end, steep = np.abs(share[:, None]), np.clip(drop / bend, 0, 1)  # of its way around the edge
     hung = drop / np.where(across < 0, left, right)
     cells, at = np.reshape(lower_by or np.zeros(LIES), LIES), (np.arange(LIES[1]) + 0.5) / LIES[1] * 2 - 1
+    beside = np.pad(cells, ((0, 0), (2, 2)), "edge")
+    cells = np.minimum(cells, (beside[:, 4:] + beside[:, :-4]) / 2)  # it lies over narrow valleys
     lower = np.array([np.interp(across / (w / 2), at, row) for row in cells])
     # broad folds that run across, wander, swell and fade, and none along its hems
     way = d / FOLDED * np.pi * (share[:, None] + 0.25 * np.sin(1.9 * x + phase[0]) + 0.1 * np.sin(4.7 * x + phase[1]))

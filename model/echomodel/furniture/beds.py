@@ -77,7 +77,7 @@ def bedding(
         parts.append(replace(pillow(place, half, "linen", "pillow", turn), power=power))
     start = z0 + (z1 - z0) * choices.between("spread", 0.28, 0.42)
     x, y, top = w * 0.53 + 0.02 + 0.03 * style.softness, low - 0.11, low + thick + 0.09
-    end = z1 + (0.08 + 0.02 * style.softness if falls else 0.03)
+    end = z1 + (0.1 + 0.02 * style.softness if falls else 0.03)
     cloth = str(choices.stream("cover").choice(COVERS))
     parts.append(cover((-x, y, start), (x, top, end), cloth, 0.12, 0.085, rng, falls=falls))
     fold = 0.16 + 0.1 * style.softness  # the sheet turned back over it

@@ -18,7 +18,8 @@ HEAD = 0.38  # of half a pillow's thickness that a head has left in its middle
 SEAM = 0.025  # of half a pillow's thickness that is left at its seams
 DROOP = 0.25  # of half a pillow's thickness that its corners hang down
 SUNK = 0.0115  # metres below its highest folds at most that things lie on a cover: half of it is about as high
-LOOSE, ROLLED = 0.04, 0.025  # metres that what hangs of a cover is in waves at most, and that its hem turns under
+SHEET = 0.02  # metres of its folds below which a cover is a sheet
+LOOSE, ROLLED = 0.055, 0.02  # metres that what hangs of a cover is in waves at most, and that its hem turns under
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +32,8 @@ class Pillow(Ball):
     soft = draped = True
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
-        count, phase = (4, 8, 10, 14)[detail], 7.0 * float(self.centre @ (1.0, 0.3, 1.7)) + 1.0
+        count = (4, 8, 10, 10 if self.role == "pillow" else 14)[detail]
+        phase = 7.0 * float(self.centre @ (1.0, 0.3, 1.7)) + 1.0
         line = np.sin(np.linspace(-1, 1, count + 1) * np.pi / 2)
         u, v = np.meshgrid(line, line, indexing="ij")
         dent = 0.12 * np.sin(2.2 * u + phase) * np.cos(1.8 * v + 1.6 * phase)
@@ -107,9 +109,10 @@ class Cover(Block):
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         w, h, d = self.half
-        r, steps, (one, two, three) = min(self.radius, h, w / 2, d / 2), (5, 9, 18, 27)[detail], self.phase
+        r, (one, two, three) = min(self.radius, h, w / 2, d / 2), self.phase
+        steps = (5, 9, 18, 27)[detail if self.depth > SHEET else min(detail, 1)]
         bend = r * np.pi / 2  # metres of cloth around an edge
-        roll, hang = np.linspace(0, bend, 4), bend + np.array([0.4, 0.9, 1.0]) * max(2 * h - r, 1e-3)
+        roll, hang = np.linspace(0, bend, 4), bend + np.array([0.35, 0.8, 0.95, 1.0]) * max(2 * h - r, 1e-3)
         side, over = np.concatenate([roll, hang]), np.linspace(r - w, w - r, steps + 1)[1:-1]
         across = np.concatenate([r - w - side[::-1], over, w - r + side])
         flat = np.linspace(r - d, d - r, max(2, round(0.6 * steps * d / w)) + 1)[1:-1]
@@ -122,10 +125,10 @@ class Cover(Block):
         crease = np.abs(np.sin(7 * x + np.sin(4.1 * x + two) + one)) ** 4
         swell = np.clip(0.6 + 0.8 * np.sin(3.1 * z + 4.7 * x + three), 0, 1) * np.clip(1.8 * (t + d) - 0.8, 0.1, 1)
         low = 0.78 * crease * swell + 0.15 * np.sin(4.3 * z - 2.6 * x + one) ** 2
-        wave = 0.5 + 0.5 * np.sin(11 * line + one + 1.3 * np.sin(4 * line + two) + out[0])
-        wave = wave * out[0] ** 2 + (0.5 * crease + 0.5 * wave) * out[1] ** 2
+        wave = 1 - np.abs(np.sin(8.5 * line + one + 1.2 * np.sin(3.1 * line + two) + out[0])) ** 0.7
+        wave = np.maximum(wave, 0.8 * crease * out[1] ** 2) * (0.75 + 0.25 * np.sin(2.3 * line + three))
         loose = min(self.depth, LOOSE)
-        reach = (r * np.sin(turn) - loose * wave * hung - ROLLED * hung**20) * (
+        reach = (r * np.sin(turn) - loose * wave * np.sqrt(hung) - ROLLED * hung**12) * (
             1 + hung * (length / np.maximum(far, 1e-9) - 1)
         )
         y = h - r * (1 - np.cos(turn)) - hung * (2 * h - r) - self.depth * low * np.cos(turn)

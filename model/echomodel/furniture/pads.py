@@ -12,6 +12,7 @@ from echomodel.furniture.style import Style
 # Role of a cushion -> of its crown: how deep it is dented where one sits or leans, and how else its face is uneven.
 GIVES = {"seat": (0.42, 0.14), "back": (0.15, 0.3), "": (0.0, 0.2)}  # others are firm
 SAT, FULL = 0.62, 0.025  # metres of a seat for one person; of a crown from which on it is dented so
+FRONT = 0.02  # metres that a seat's front is fuller in its middle than at its seams, at most
 LEVEL = 0.35  # of a crown that its edges are high amid a side, over the corners
 DRAWN = 0.018  # metres that corners are drawn in at most
 CELLS = (0.45, 0.22, 0.13, 0.1)  # metres between points of a face, by detail
@@ -37,17 +38,17 @@ class Pad(Block):
         thin = int(np.argmin(self.half))
         across, along = ((2, 1), (0, 2), (0, 1))[thin]
         tall, r, bulge = self.half[thin], min(self.radius, *(self.half * 0.999)), 0.14 * self.crown
-        wide = self.half[[across, along]] - bulge
-        # metres without its flat face, and below it: over its edge, in its seam, below that, down its side
-        edge = [(0, 0), (0.85 * r, 0.48 * r), (r - SEWN, 0.5 * r + BESIDE), (r, 0.5 * r + 2 * BESIDE)]
-        edge += [(r + bulge, 0.25 * r + BESIDE + tall), (0.94 * r - bulge, 2 * tall)]
-        out, down = np.array([edge[int(n)] for n in ("0125", "0125", "01245", "012345")[detail]]).T
+        wide, full = self.half[[across, along]] - bulge, min(self.crown, FRONT) * (self.role == "seat" and thin == 1)
+        # metres without its flat face, below it, share of its fullness: over its edge, in its seam, below, down it
+        edge = [(0, 0, 0), (0.85 * r, 0.48 * r, 0.1), (r - SEWN, 0.5 * r + BESIDE, 0.2), (r, 0.5 * r + 2 * BESIDE, 0.3)]
+        edge += [(r + bulge, 0.25 * r + BESIDE + tall, 1), (0.9 * r - bulge, 2 * tall, 0.2)]
+        out, down, ahead = np.array([edge[int(n)] for n in ("0125", "0125", "01245", "012345")[detail]]).T
         rings, lines = np.arange(1, len(out)), []
         for half in wide - r:
             flat = np.linspace(-half, half, int(np.clip(round(2 * half / CELLS[detail]), 2, 14)) + 1)
             lines.append(np.concatenate([-half - rings[::-1], flat, half + rings]))
         inner, away, ring, _ = beyond(lines, wide - r)
-        out, down = out[ring.round().astype(int)], down[ring.round().astype(int)]
+        out, down, ahead = (line[ring.round().astype(int)] for line in (out, down, ahead))
         u, v = places = (inner + away * out) / wide[:, None, None]
         if np.isfinite(self.power):
             far = abs(places)
@@ -68,6 +69,7 @@ class Pad(Block):
         front = -float(np.sign(self.centre[0]) or 1.0) if thin == 0 else 1.0  # an arm's face looks towards the seat
         points = np.empty((*u.shape, 3))
         points[..., thin], points[..., across], points[..., along] = front * (tall - lower), u * wide[0], v * wide[1]
+        points[..., along] += full * (ahead * (v > 0) * (1 - u**4) - 0.5 * (1 + v))
         return points
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:

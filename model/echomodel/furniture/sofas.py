@@ -137,7 +137,7 @@ def _couch(
         low, foot = (-w / 2 + 0.02, foot, z0 + 0.04), foot + 0.04
         parts.append(box(low, (w / 2 - 0.02, foot, z1 - 0.035), "wood", 0.006, "leg"))
     inset, under = (0.13 * arm, 0.006) if body.get("skirt") else (arm * 0.5, foot)
-    parts += _rails((-w / 2 + inset, under, z0 + 0.02), (w / 2 - inset, seat - pad, z1 - 0.02), seats)
+    parts += _rails((-w / 2 + inset, under, z0 + 0.02), (w / 2 - inset, seat - pad, z1 - 0.035), seats)
     tall = h - (0.06 if seats > 1 and style.contrast < 0.6 else 0.0)
     x = w / 2 - max(0.4 * arm, 0.012)
     low, high, across = (-z0 - frame, foot + 0.02, -x), (-z0, tall, x), rotation(y=np.pi / 2)
@@ -147,7 +147,7 @@ def _couch(
     if arm:
         parts += upholstered_arms(w, foot, y_arm, d, arm, style)
     inner = w / 2 - arm
-    front_z = z1 + 0.01
+    front_z = z1 + 0.015
     xs = np.linspace(-inner, inner, seats + 1)
     pads = 1 if body.get("seat") == "one" and not chaise else seats
     parts += _cushions(-inner, inner, seat - pad, seat, z0 + frame * 0.9, front_z, pads, style)
