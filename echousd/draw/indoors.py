@@ -19,8 +19,9 @@ from echousd.stage.values import NOW
 # and pictures of rooms have it warmer than the light of the sky.
 SUN = 4 * np.array([1.12, 1.0, 0.78], np.float32)
 # What is seen through windows is over-exposed, as in photographs of interiors, and rolled off as film does: how much
-# brighter it is by day, the power of the sky's light by which it is less in the evening, and haze before it.
-THERE, DUSK, VEIL = 2.45, 0.5, 0.04
+# brighter it is by day, the power of the sky's light by which it is less in the evening, and haze before it; what is
+# how dark is lifted by which power: a tree before one window leaves it no darker than others.
+THERE, DUSK, VEIL, LIFTED = 2.45, 0.5, 0.03, (0.15, 0.4)
 WHITER = 0.25  # how much less coloured the light of lamps is than told: no wall is as yellow to eyes
 DIM = 0.004  # radiance at every place of a room without lamps and windows, so that one sees it
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
@@ -101,7 +102,8 @@ class Lights:
 
     def there(self, color: np.ndarray) -> np.ndarray:
         """(3, n) how a picture shows colours (3, n) of what lies around."""
-        return np.asarray(rolled((VEIL + (1 - VEIL) * color) * (THERE * self.day**DUSK * self.tint)[:, None]), "f4")
+        color = VEIL + (1 - VEIL) * color * (LIFTED[0] / np.clip(LUMA @ color, 1e-3, LIFTED[0])) ** LIFTED[1]
+        return np.asarray(rolled(color * (THERE * self.day**DUSK * self.tint)[:, None]), "f4")
 
 
 def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = (), halved: int = 0) -> Lights:

@@ -78,3 +78,10 @@ def test_what_glares_is_bleached_and_what_does_not_keeps_its_hue():
     dim, glare = shown(colour), shown(100 * colour)
     assert glare.min() > 0.9
     assert dim.max() / dim.min() > 3.5
+
+
+def test_a_dark_tree_before_a_window_is_no_hole_and_keeps_its_colour():
+    lights = box_room(sky=1.0)[0].lights
+    lawn, tree = (lights.there(np.array([[0.5], [1.0], [0.4]], np.float32) * level) for level in (0.3, 0.02))
+    assert 0.3 < tree[1, 0] ** (1 / 2.2) < 0.6 * lawn[1, 0] ** (1 / 2.2)
+    assert tree[1, 0] > 1.3 * tree[0, 0]
