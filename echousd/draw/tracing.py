@@ -260,7 +260,7 @@ def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, ofte
     found[-1] = found[4] > 0
     gloss = world.scenery.gloss.take(seen.face).reshape(shape)[coarse]
     reach = (
-        (np.s_[:3], RINGS[:3]), (np.s_[3:4], RINGS, gloss), (np.s_[4:5], () if inside else RINGS),
+        (np.s_[:3], RINGS[:3]), (np.s_[3:4], RINGS, gloss), (np.s_[4:5], RINGS[:1] if inside else RINGS),
         (np.s_[5:-1], RINGS[:3] if world.fine else ()), (np.s_[-1:], RINGS[:1]),
     )  # fmt: skip
     found = smooth_light(found.reshape(-1, *asked.shape), known[0], known[1], reach)
@@ -370,7 +370,7 @@ def _breadth(world: World, seen: Seen) -> np.ndarray:
     return np.asarray(2 * world.view.half / world.size * (away / np.sqrt(slant)) ** (not world.view.orthographic))
 
 
-SUN_SPREAD = 0.10  # radius of the sun's disc at distance 1: soft shadows
+SUN_SPREAD = (0.10, 0.015)  # radius of the sun's disc at distance 1, outside and, as if in haze, inside: soft shadows
 SUN_LIGHT = np.array([1.05, 0.99, 0.90], np.float32)
 
 
@@ -448,7 +448,7 @@ def _sunny(world: World, point: np.ndarray, normal: np.ndarray, spot: np.ndarray
     sun, inside = world.scenery.lights.sun, world.view.inside
     if inside and (sun is None or not len(world.scenery.panes)):
         return np.zeros(point.shape[1], np.float32)
-    towards = unit(world.towards + np.float32(0.005 if inside else SUN_SPREAD) * on_sphere(spot))
+    towards = unit(world.towards + np.float32(SUN_SPREAD[inside]) * on_sphere(spot))
     facing = np.clip(along(normal, towards), 0, None)
     return free(world.tree, point, towards, np.full(len(facing), 1e3, np.float32), facing > 0) * facing
 

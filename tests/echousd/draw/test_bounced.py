@@ -105,3 +105,22 @@ def test_the_rougher_a_floor_the_softer_it_mirrors_the_edge_of_a_window():
         found = np.mean([tracing._mirrored(world, seen, np.broadcast_to(one, (2, 201))) for one in squares], 0)
         wide.append(((found > 0.2 * found.max()) & (found < 0.8 * found.max())).mean() * 2)
     assert wide[0] > 0.18 > 3 * wide[1]
+
+
+def test_the_sun_has_soft_borders_inside_the_further_what_stands_in_its_way():
+    up = np.array([(0.0, 1.0, 0.0), (1.0, 1.0, 1.0)], np.float32)
+    pane, x = np.array([[(1.99, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.8, 0.0)]], np.float32), np.linspace(-0.1, 0.1, 201)
+    point, normal = np.stack([x, 0 * x + 0.01, 0 * x]), np.stack([0 * x, 0 * x + 1, 0 * x])
+    spots, wide = np.random.default_rng(0).random((400, 2, 1), np.float32), []
+    for high in (0.5, 2.0):
+        scenery, down = box_room(sky=0.0, sun=up)
+        scenery = with_sheet(
+            replace(scenery, panes=pane), np.array([(0, high, -1), (0, high, 1), (2, high, 1), (2, high, -1)])
+        )
+        shown = ~(scenery.triangles[..., 1] > 2.9).all(1)
+        world = World(embree(scenery.triangles[shown]), scenery, down, 48, np.zeros(4), TABLE, np.ones(3, np.float32))
+        shares = np.mean(
+            [tracing._sunny(world, point.astype("f4"), normal, np.broadcast_to(one, (2, 201))) for one in spots], 0
+        )
+        wide.append(((shares > 0.05) & (shares < 0.95)).mean() * 0.2)
+    assert 0.005 < wide[0] < 0.02 < wide[1] < 0.07
