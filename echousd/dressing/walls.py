@@ -352,8 +352,11 @@ def clock(setting: Setting) -> None:
     """A clock on a wall where people sit together or work."""
     rng = setting.rng("wall clock")
     if setting.walls and setting.of("clock") and setting.has(CLOCKS, rng):
-        least = sorted(free_walls(setting, CLOCK), key=lambda one: one[0])  # where nothing larger fits
-        _hung(setting, _new("wall_clock", rng), [(wall, middle / wall.length) for _, middle, wall in least], 1.62)
+        least = sorted(free_walls(setting, CLOCK), key=lambda one: one[0])  # where nothing larger fits, or aside
+        ways = [
+            (wall, middle + (length > BROAD) * (length / 2 - CLOCK / 2), wall.length) for length, middle, wall in least
+        ]
+        _hung(setting, _new("wall_clock", rng), [(wall, along / whole) for wall, along, whole in ways], 1.62)
 
 
 def coats(setting: Setting) -> None:

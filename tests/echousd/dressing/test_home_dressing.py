@@ -353,3 +353,15 @@ def test_the_only_desk_has_a_rug_before_it_though_it_stands_at_a_wall():
     (rug,) = room.placed
     assert rug.on == "desk"
     assert rug.position[2] > room.objects["desk"].position[2]
+
+
+@pytest.mark.parametrize("length", [1.2, 3.0])
+def test_a_clock_hangs_in_the_middle_of_a_short_wall_and_aside_on_a_long_one(length, monkeypatch):
+    wall = walls.walls_of(FLOOR)[2]
+    monkeypatch.setattr(walls, "free_walls", lambda *_: [(length, wall.length / 2, wall)])
+    room = setting("multi_seat_sofa")
+    room.full = True
+    walls.clock(room)
+    (one,) = room.placed
+    aside = abs((one.position[[0, 2]] - wall.start) @ wall.along - wall.length / 2)
+    assert aside == pytest.approx(0.0 if length < walls.BROAD else length / 2 - walls.CLOCK / 2, abs=1e-6)
