@@ -39,11 +39,10 @@ def edit(
 
     asked = {kind: changes.pop(kind, None) for kind in EditRequest.__dataclass_fields__}
     wishes = EditRequest(**{kind: words for kind, words in asked.items() if words})
-    alone = undo + redo + recover
-    if alone and (wishes != EditRequest() or dry_run or output is not None or alone > 1):
-        does = "--undo takes the last edit back" if undo else "--redo makes it again"
-        does = "--recover finishes what was interrupted" if recover else does
-        raise ValueError(f"{does} and does nothing else; leave the other options out")
+    does = {"--undo takes the last edit back": undo, "--redo makes it again": redo}
+    alone = [word for word, asked in ({**does, "--recover finishes what was interrupted": recover}).items() if asked]
+    if alone and (wishes != EditRequest() or dry_run or output is not None or len(alone) > 1):
+        raise ValueError(f"{alone[0]} and does nothing else; leave the other options out")
     if recover:
         _recover(room, wait, json)
         return

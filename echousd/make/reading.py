@@ -29,7 +29,7 @@ from echousd.shapes.matter import read_mass
 from echousd.stage.contents import read_contents, room_frame, surface_of
 from echousd.stage.files import open_stage, opened
 from echousd.stage.paths import DESCRIPTION, GEO, OBJECTS, asset_file, piece_name, piece_of
-from echousd.stage.read import find_rooms, read_graph
+from echousd.stage.read import find_rooms, room_graph, the_room
 from echousd.stage.showing import each_layout
 from echousd.stage.units import Z_TO_Y, metres_per_unit
 from echousd.stage.values import NOW, matrix, reading
@@ -45,6 +45,7 @@ class SavedRoom:
     graph: SceneGraph  # the composed stage's graph, an artist's changes included
     boxes: Boxes  # N boxes in the order of the graph's nodes, as composed
     layouts: tuple[Boxes, ...]  # all arrangements of the variant set `layout`, in its order, or `boxes` alone
+    operations: Mapping[str, Mapping[str, Any]]  # object name -> names of its own transforms, in order -> values
     geometry: Mapping[str, Geometry]  # object name -> geometry; objects of one asset have one
     assets: Mapping[str, str]  # object name -> asset name
     carried: Mapping[str, Mapping[str, bytes]]  # asset name -> its files as they are, path -> bytes
@@ -60,11 +61,12 @@ def read_room(root: str | Path) -> SavedRoom:
     recover(root.parent)
     stage, manifest = open_stage(root), manifest_of(root)
     shelf = shelf_of(manifest, root.parent)
-    graph = read_graph(stage)
+    graph = room_graph(the_room(stage, None))
     geometry: dict[str, Geometry] = {}
     carried: dict[str, Mapping[str, bytes]] = {}
     assets: dict[str, str] = {}
     made: dict[str, Geometry] = {}
+    operations: dict[str, dict[str, Any]] = {}
     at = stage.GetPrimAtPath(manifest["room_path"])
     objects, z_up, metres = f"{at.GetPath()}/{OBJECTS.rpartition('/')[2]}", stands_z_up(at), metres_per_unit(stage)
     for node in graph.nodes:
@@ -96,11 +98,12 @@ def read_room(root: str | Path) -> SavedRoom:
                 must = asset_file(asset)
                 carried[asset] = {path: f.read_bytes() for path, f in files.items() if path == must or f.exists()}
         assets[node.name], geometry[node.name] = asset, found
+        operations[node.name] = {op.GetName(): op.Get(NOW) for op in UsdGeom.Xformable(prim).GetOrderedXformOps()}
     bounds = np.array([geometry[name].mesh.bounds for name in graph.names])
     sizes = np.asarray(bounds[:, 1] - bounds[:, 0], np.float32)
     boxes = _boxes(stage, objects, graph, sizes)
     layouts = tuple(_boxes(stage, objects, graph, sizes) for _ in each_layout(stage))
-    return SavedRoom(graph, boxes, layouts, geometry, assets, carried, manifest)
+    return SavedRoom(graph, boxes, layouts, operations, geometry, assets, carried, manifest)
 
 
 def _boxes(stage: Usd.Stage, objects: str, graph: SceneGraph, size: np.ndarray) -> Boxes:
@@ -252,10 +255,19 @@ def with_locked_places(graph: SceneGraph, *files: Path | None) -> tuple[SceneGra
     """
     wanted = {node.name for node in graph.nodes if node.locked and None in (node.size, node.position, node.yaw)}
     for file in files:
-        stage = None if file is None else _stage_of(file)
-        if wanted and stage is not None:
-            graph, found = _filled(graph, stage, wanted)
-            wanted -= found
+        at = _stage_of(file) if wanted and file else None
+        stage = opened(at) if at else None
+        things = (
+            {one.node.name: one for room in find_rooms(stage) for one in read_contents(room).objects} if stage else {}
+        )
+        for name in wanted & things.keys():
+            thing, node = things[name], graph.node(name)
+            graph = graph.update_node(
+                name, size=node.size or tuple(thing.size.round(4).tolist()),
+                position=node.position or tuple(thing.position.round(4).tolist()),
+                yaw=round(float(thing.yaw), 7) if node.yaw is None else node.yaw,
+            )  # fmt: skip
+        wanted -= things.keys()
     lost = sorted(name for name in wanted if graph.node(name).position is None)
     return graph, tuple(f"{name} is locked but stands nowhere yet: it gets a place like all others" for name in lost)
 
@@ -319,17 +331,3 @@ def _stage_of(file: Path) -> Path | None:
     """The stage at a path: the file itself, or the root layer of a room's folder."""
     found = root_in(file) if file.is_dir() else file
     return found if found and found.is_file() and found.suffix in STAGE_FORMS else None
-
-
-def _filled(graph: SceneGraph, file: Path, wanted: set[str]) -> tuple[SceneGraph, set[str]]:
-    stage = opened(file)
-    things = {thing.node.name: thing for room in find_rooms(stage) for thing in read_contents(room).objects}
-    found = wanted & things.keys()
-    for name in found:
-        thing, node = things[name], graph.node(name)
-        graph = graph.update_node(
-            name, size=node.size or tuple(thing.size.round(4).tolist()),
-            position=node.position or tuple(thing.position.round(4).tolist()),
-            yaw=round(float(thing.yaw), 7) if node.yaw is None else node.yaw,
-        )  # fmt: skip
-    return graph, found

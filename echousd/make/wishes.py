@@ -88,7 +88,7 @@ def artists_wishes(root: Path) -> tuple[Path, SceneGraph, tuple[str, ...], dict[
 
     Objects that the layer moves, turns or puts beside what they are copies of are fixed there, and locked.
 
-    Raises ValueError where `root` is no layer over a room of ours, or changes nothing.
+    Raises ValueError where `root` is no layer over a room of ours, changes nothing, or moves on from a room's places.
     """
     theirs = read_room(root)
     own = own_root(root)
@@ -104,6 +104,9 @@ def artists_wishes(root: Path) -> tuple[Path, SceneGraph, tuple[str, ...], dict[
         shift = theirs.boxes.position[row] - ours.boxes.position[like]
         turn = np.angle(np.exp(1j * (theirs.boxes.yaw[row] - ours.boxes.yaw[like])))
         if np.all((np.linalg.norm(shift, axis=1) > MOVED) | (abs(turn) > TURNED)):
+            if name not in copies and ours.operations[name].items() <= theirs.operations[name].items():
+                own_values = f"other values of its own {' and '.join(ours.operations[name])}"
+                raise ValueError(f"{root}: moves {name} from wherever the room puts it, allowed: {own_values}")
             graph = _placed(graph, theirs, name, anew=True).lock(name)
             moved.append(name)
     if not ours.graph.diff(graph).lines():

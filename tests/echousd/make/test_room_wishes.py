@@ -242,6 +242,26 @@ def test_python_brings_a_room_up_to_date_with_a_layer_over_it(root):
         echousd.update(path)
 
 
+@pytest.mark.parametrize(("change", "says"), [
+    (lambda stage: UsdGeom.Xformable(stage.GetPrimAtPath("/Room/Objects/wardrobe")).AddTranslateOp(
+        opSuffix="edit").Set((0.0, 0.0, 0.3)),
+     r"moves wardrobe from wherever the room puts it, allowed: other values of its own xformOp:translate and xformOp:"),
+    (lambda stage: UsdGeom.Xformable(stage.GetPrimAtPath("/Room/Objects")).AddTranslateOp().Set((0.0, 0.0, 0.3)),
+     r"moves bed from wherever the room puts it, allowed: other values of its own xformOp:translate"),
+    (lambda stage: stage.GetPrimAtPath("/Room/SceneGraph").SetActive(False),
+     r"mine\.usda: no scene graph \(no EchoSceneGraph prim\)"),
+])  # fmt: skip
+def test_what_would_be_done_twice_or_takes_the_graph_away_is_no_update(root, change, says):
+    layer = Sdf.Layer.CreateNew(str(root.with_name("mine.usda")))
+    layer.subLayerPaths = [f"./{root.name}"]
+    change(Usd.Stage.Open(layer))
+    layer.Save()
+    before = files(root.parent)
+    with pytest.raises(ValueError, match=says):
+        echousd.update(layer.realPath)
+    assert files(root.parent) == before
+
+
 def test_a_piece_that_a_stronger_layer_copies_stays_where_it_was_put_and_is_one(root, echousd_command):
     path = root.with_name("mine.usda")
     layer = Sdf.Layer.CreateNew(str(path))
