@@ -34,7 +34,7 @@ NEAR, SCATTERED, BAND = np.float32(0.5), (np.float32(1021), np.float32(769)), 0.
 # Gloss from which on surfaces mirror, and are metal, of which so much is not mirrored; how far from where a mirror
 # would a rough one mirrors.
 GLOSSY, METAL, MATT, BLUR = 0.2, 0.5, 0.4, 0.6
-SUNNY = 1.7  # of the mean light in a room: at most what the sun gives, as if blended in from darker exposures
+SUNNY = 2.0  # of the mean light in a room: at most what the sun gives, as if blended in from darker exposures
 WASHED = 0.25  # how much less coloured a shade is that a bulb shines through
 HALO = (0.02, 0.2)  # width, of the picture's, over which what shines is spread, and the share of it
 GLINT = 1.2  # of the mean light: at most what rough surfaces mirror of a lamp, whose noise looks like smoke
