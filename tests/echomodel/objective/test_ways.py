@@ -92,3 +92,15 @@ def test_a_second_sofa_stands_not_behind_the_first(at, behind):
         if k == 2
     ]
     assert ((True, 1) in told) == behind
+
+
+@pytest.mark.parametrize(("back", "margin"), [(-0.6, -0.15), (-0.3, 0.15)])
+@pytest.mark.parametrize(("word", "wide"), [("armchair", 0.9), ("multi_seat_sofa", 2.2)])
+def test_a_side_table_is_no_use_behind_its_seat(back, margin, word, wide):
+    seat = (word, (wide, 0.85, 1.0), (0.0, 0.0), 0.0)
+    table = ("side_table", (0.4, 0.55, 0.4), (wide / 2 + 0.4, back), 0.0)
+    lamp = ("floor_lamp", (0.4, 1.6, 0.4), (wide / 2 + 0.4, back), 0.0)
+    found, rows = seen(company.at_its_side, [seat, table])
+    assert found[1] == pytest.approx(margin)
+    assert rows.words.tolist() == [1]
+    assert seen(company.at_its_side, [seat, lamp])[0][1] > 0

@@ -76,7 +76,9 @@ def test_new_object_leaves_all_others_alone(root):
 
 def test_an_edit_leaves_small_things_alone(tmp_path):
     options = RoomOptions(walls=True, dress="full")
-    room = echousd.generate(small_graph(), seed=5, model=StandIn(), shapes="boxes", options=options)
+    room = echousd.generate(
+        small_graph(), seed=1, model=StandIn(), shapes="boxes", options=options
+    )  # none where the chair goes
     root = room.save(tmp_path / "bedroom", preview=False)
 
     def things() -> dict[str, str]:
