@@ -319,7 +319,7 @@ def shelves(setting: Setting) -> None:
         for board in [found for at in lows if (found := _hung(setting, one, [(wall, spot)], at, above=ABOVE))]:
             done += 1
             _carries(setting, board, f"wall shelf {done}")
-        if done > setting.parts:
+        if done > 1:
             return
 
 
