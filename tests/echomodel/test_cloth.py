@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from echomodel.dressing.textiles import LEAN, cushion
+from echomodel.dressing.textiles import LEAN, LIES, cushion, throw
 from echomodel.furniture import draw_choices, draw_style, solids
 from echomodel.furniture.cloth import cover, pillow, seam
+from echomodel.furniture.pads import cushion as seat_cushion
 from echomodel.furniture.sofas import BODIES, upholstered_arms
 from echomodel.furniture.style import FAMILIES
 from echomodel.furniture.tufting import Tufted
@@ -103,6 +104,37 @@ def test_a_cover_that_hangs_hides_the_corners_of_its_frame():
         hem = hem[hem[:, 1] < 0.4]
         assert (hem[:, 0] + hem[:, 2]).max() > 1.75, seed  # a corner as round as its edges ends at 1.74
         assert (hem[:, 2] - hem[:, 0]).max() > 1.75, seed
+
+
+def test_what_hangs_of_a_cover_swells_between_narrow_folds():
+    """A board's edge is straight; that of a duvet stands out by centimetres for most of its way."""
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        points = cover((-0.8, 0.3, -1.0), (0.8, 0.7, 1.0), "blanket", 0.12, 0.085, rng, falls=True).mesh()[0]
+        foot = points[(points[:, 2] > 0.85) & (abs(points[:, 0]) < 0.6) & (abs(points[:, 1] - 0.42) < 0.06), 2]
+        assert len(foot) > 15
+        assert np.ptp(foot) > 0.02, seed
+        assert foot.max() - np.median(foot) < np.median(foot) - foot.min(), seed
+
+
+def test_the_front_of_a_seat_is_fuller_in_its_middle():
+    style = replace(draw_style(np.random.default_rng(3)), softness=0.7)
+    points = seat_cushion((-0.4, 0.3, -0.3), (0.4, 0.45, 0.3), style).mesh()[0]
+    front = points[points[:, 2] > 0.2]
+    middle, ends = front[abs(front[:, 0]) < 0.15], front[abs(front[:, 0]) > 0.35]
+    assert middle[:, 2].max() == pytest.approx(0.3, abs=0.005)
+    assert ends[:, 2].max() < 0.28
+    assert 0.34 < middle[middle[:, 2].argmax(), 1] < 0.4  # over the seam below, and below the one over it
+
+
+def test_a_throw_lies_over_narrow_valleys_and_in_broad_ones():
+    def lowest(columns):
+        below = np.zeros(LIES)
+        below[:, columns] = 0.08
+        points = throw((2.0, 0.3, 0.6), np.random.default_rng(1), (0.3, 0.3, *below.ravel()))[0].mesh()[0]
+        return points[abs(points[:, 0]) < 0.3, 1].min()
+
+    assert lowest([14]) > lowest(range(10, 18)) + 0.03
 
 
 def test_sofas_have_eight_bodies_and_each_family_builds_several():

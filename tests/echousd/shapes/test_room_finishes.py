@@ -55,6 +55,16 @@ def test_images_hold_the_colour_that_was_asked_for():
     assert baking.normal_image("leaf", 0.3) is None
 
 
+def test_cloth_lies_in_folds_that_go_on_beyond_the_picture():
+    height = creased()
+    for axis in (0, 1):
+        step, around = np.abs(np.diff(height, axis=axis)), np.abs(height.take(0, axis) - height.take(-1, axis))
+        assert around.max() <= step.max()
+    slope = np.hypot(*np.gradient(height)) * SIZE
+    assert 0.12 < np.quantile(slope, 0.95) < 0.4  # seen, and not like crumpled paper
+    assert np.quantile(slope, 0.95) > 3 * np.median(slope)  # most of it is smooth
+
+
 def test_images_are_small_and_keep_normals_whole():
     """Pixels are coded by what is in them; hues at half the places, where they are no normals."""
     for image, places in ((pictures.color_image("wood", (0.5, 0.4, 0.3), "oak"), 2),
