@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
+from math import sqrt
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -171,17 +172,16 @@ class Tube(Solid):
         return replace(super().mirrored(axis), points=self.points * np.where(np.arange(3) == axis, -1.0, 1.0))
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
-        tangents = np.gradient(self.points, axis=0)
+        p = self.points
+        tangents = np.concatenate([p[1:2] - p[:1], (p[2:] - p[:-2]) / 2, p[-1:] - p[-2:-1]])
         circle = superellipse(2.0, 4 if self.radius < 0.006 else (4, 6, 8, 12)[detail]) * self.radius
-        rings, x = [], None
-        for point, tangent in zip(self.points, tangents, strict=True):
-            y = tangent / np.linalg.norm(tangent)
-            if x is None:
-                x = upright(np.zeros(3), y)[:, 0]
-            x = x - y * (x @ y)
-            x = x / np.linalg.norm(x)
-            rings.append(point + circle[:, :1] * x + circle[:, 1:] * cross(x, y))
-        return loft(rings)
+        ways = [tangent / sqrt(tangent.dot(tangent)) for tangent in tangents]
+        aside = [upright(np.zeros(3), ways[0])[:, 0]]
+        for way in ways:  # each turned as little as can be from the one before
+            x = aside[-1] - way * (aside[-1] @ way)
+            aside.append(x / sqrt(x.dot(x)))
+        x, y = np.array(aside[1:]), np.array(ways)
+        return loft(p[:, None] + circle[:, :1] * x[:, None] + circle[:, 1:] * cross(x, y)[:, None])
 
 
 def _corners(detail: int, radius: float) -> int:
