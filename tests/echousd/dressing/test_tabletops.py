@@ -1,13 +1,16 @@
 """Levels of furniture that carry small things."""
 
+import warnings
+
 import numpy as np
 import pytest
 import shapely
 import trimesh
 
+from echomodel.dressing import KINDS
 from echomodel.furniture import draw_choices, draw_style, solids
 from echomodel.furniture.carpentry import box
-from echousd.dressing.setting import standing
+from echousd.dressing.setting import geometry_of, standing
 from echousd.dressing.tabletops import surfaces
 from echousd.shapes.geometry import Collider, Geometry, Origin, Part
 from echousd.shapes.joinery import assembled
@@ -50,3 +53,11 @@ def test_a_thick_board_above_closes_no_shelf_and_a_front_does(thick, front, clos
     level = min((one for one in surfaces(host) if one.area.area > 0.1), key=lambda one: one.y)
     assert level.closed == closed
     assert level.air == pytest.approx(0.58 - max(thick, 0.04), abs=0.006)
+
+
+@pytest.mark.parametrize("kind", ["pot_plant", "small_plant"])
+def test_plants_keep_all_their_leaves_and_nobody_is_warned(kind):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for variant in range(12):
+            assert geometry_of(kind, KINDS[kind].high, variant).parts
