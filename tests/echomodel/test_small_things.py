@@ -94,4 +94,4 @@ def test_a_throw_lies_in_folds_on_what_it_knows_and_its_hems_are_thin(seed):
     assert sides[1] - sides[0] == pytest.approx(0.05, abs=0.03)
     sunk = (level.front - bent.front)[..., 1]
     assert np.abs(sunk[:, np.abs(level.front[0, :, 0] + 0.4) < 0.3]).max() < 1e-9
-    assert sunk[:, np.abs(level.front[0, :, 0] - 0.4) < 0.3] == pytest.approx(0.06)
+    assert sunk[:, np.abs(level.front[0, :, 0] - 0.45) < 0.25] == pytest.approx(0.06)  # beyond the step that it bridges

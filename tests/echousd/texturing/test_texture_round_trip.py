@@ -27,7 +27,7 @@ from echousd.texturing.job import job_mesh
 from echousd.texturing.obj import glb_bytes
 from echousd.texturing.results import read_results
 
-SIDE, SQUARE = 768, 320  # pixels of a picture for all, and of one for each object or all small things
+SIDE, SQUARE = 768, 352  # pixels of a picture for all, and of one for each object or all small things
 
 
 @pytest.fixture(scope="module")
