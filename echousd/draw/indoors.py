@@ -19,8 +19,8 @@ from echousd.stage.values import NOW
 # and pictures of rooms have it warmer than the light of the sky.
 SUN = 4 * np.array([1.12, 1.0, 0.78], np.float32)
 # What is seen through windows is over-exposed, as in photographs of interiors, and rolled off as film does: how much
-# brighter it is by day, the power of the sky's light by which it is less in the evening, and haze before it; what is
-# how dark is lifted by which power: a tree before one window leaves it no darker than others.
+# brighter it is by day, the power of the sky's light by which it is less in the evening, and haze before it; the
+# brightness below which it is lifted, and by which power: a tree before one window leaves it no darker than others.
 THERE, DUSK, VEIL, LIFTED = 2.45, 0.5, 0.03, (0.15, 0.4)
 WHITER = 0.25  # how much less coloured the light of lamps is than told: no wall is as yellow to eyes
 DIM = 0.004  # radiance at every place of a room without lamps and windows, so that one sees it
