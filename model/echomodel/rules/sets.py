@@ -178,9 +178,8 @@ CARRIED: dict[str, Margin] = {
     "standing_on": lambda pair: pair.kit.minimum(TOUCH - abs(pair.position_s[:, 1] - pair.top_o), pair.centre_inside),
 }
 STRICT = RuleSet("strict", True, _rules(APART, _larger, CARRIED, _symmetrical))
-MEANS: dict[str, str] = tables("means.toml", __file__)
-MEANT = {name: replace(rule, means=MEANS[name].format_map(globals())) for name, rule in STRICT.rules.items()}
-STRICT.rules.update(MEANT)
+for name, means in tables("means.toml", __file__).items():
+    STRICT.rules[name] = replace(STRICT.rules[name], means=means.format_map(globals()))
 
 PUBLISHED: dict[str, Margin] = {"standing_on": lambda pair: TOUCH - abs(pair.position_s[:, 1] - pair.position_o[:, 1])}
 OPEN = ("standing_on", "symmetrical_to")
